@@ -1,0 +1,138 @@
+#include "launch.hpp"
+
+#include <algorithm>
+
+#include "state.hpp"
+
+namespace clratio {
+
+void wait(const Event& event) {
+    const cl_event e = event.get();
+    if (e) check(clWaitForEvents(1, &e), "clWaitForEvents");
+}
+
+namespace {
+
+Memory allocate(const Engine& engine, cl_mem_flags flags, std::size_t bytes, void* host) {
+    const auto largest = engine.info().largest_allocation;
+    if (largest && bytes > largest)
+        throw InvalidArgument("device memory", "at most " + std::to_string(largest) + " bytes in one buffer on " + engine.info().name,
+                              std::to_string(bytes));
+    cl_int code = CL_SUCCESS;
+    Memory memory(clCreateBuffer(engine.context(), flags, std::max<std::size_t>(bytes, 1), host, &code));
+    check(code, "clCreateBuffer");
+    return memory;
+}
+
+}  // namespace
+
+Buffer::Buffer(const Engine& engine, std::size_t bytes)
+    : queue_(engine.state().queue), memory_(allocate(engine, CL_MEM_READ_WRITE, bytes, nullptr)), size_(bytes) {}
+
+Buffer Buffer::zeroed(const Engine& engine, std::size_t bytes) {
+    Buffer b(engine, bytes);
+    const cl_uint zero = 0;
+    cl_event filled = nullptr;
+    check(clEnqueueFillBuffer(b.queue_.get(), b.mem(), &zero, sizeof zero, 0, bytes, 0, nullptr, &filled), "clEnqueueFillBuffer");
+    wait(Event(filled));
+    return b;
+}
+
+Buffer Buffer::from_host(const Engine& engine, std::span<const std::byte> bytes) {
+    Buffer b;
+    const bool in_place = engine.info().host_memory && !bytes.empty();
+    const cl_mem_flags use = bytes.empty() ? 0 : in_place ? CL_MEM_USE_HOST_PTR : CL_MEM_COPY_HOST_PTR;
+    b.queue_ = engine.state().queue;
+    b.memory_ = allocate(engine, CL_MEM_READ_ONLY | use, bytes.size(),
+                         bytes.empty() ? nullptr : const_cast<std::byte*>(bytes.data()));
+    b.size_ = bytes.size();
+    return b;
+}
+
+Buffer Buffer::onto_host(const Engine& engine, std::span<std::byte> bytes) {
+    Buffer b;
+    const bool in_place = engine.info().host_memory && !bytes.empty();
+    b.queue_ = engine.state().queue;
+    b.memory_ = allocate(engine, CL_MEM_READ_WRITE | (in_place ? CL_MEM_USE_HOST_PTR : cl_mem_flags{0}), bytes.size(),
+                         in_place ? bytes.data() : nullptr);
+    b.size_ = bytes.size();
+    b.host_ = bytes;
+    return b;
+}
+
+void Buffer::read(std::span<std::byte> to, std::size_t offset) const {
+    if (to.empty()) return;
+    check(clEnqueueReadBuffer(queue_.get(), mem(), CL_TRUE, offset, to.size(), to.data(), 0, nullptr, nullptr), "clEnqueueReadBuffer");
+}
+
+void Buffer::write(std::span<const std::byte> from, std::size_t offset) const {
+    if (from.empty()) return;
+    check(clEnqueueWriteBuffer(queue_.get(), mem(), CL_TRUE, offset, from.size(), from.data(), 0, nullptr, nullptr),
+          "clEnqueueWriteBuffer");
+}
+
+void Buffer::publish() const {
+    if (host_.empty()) return;
+    cl_int code = CL_SUCCESS;
+    void* mapped = clEnqueueMapBuffer(queue_.get(), mem(), CL_TRUE, CL_MAP_READ, 0, size_, 0, nullptr, nullptr, &code);
+    check(code, "clEnqueueMapBuffer");
+    if (mapped != host_.data()) std::copy_n(static_cast<const std::byte*>(mapped), size_, host_.data());
+    cl_event unmapped = nullptr;
+    check(clEnqueueUnmapMemObject(queue_.get(), mem(), mapped, 0, nullptr, &unmapped), "clEnqueueUnmapMemObject");
+    wait(Event(unmapped));
+}
+
+Launch::Launch(const Engine& engine, const std::string& word, const std::string& kernel, const std::string& options)
+    : engine_(engine), word_(word), name_(kernel), options_(options) {
+    cl_int code = CL_SUCCESS;
+    kernel_ = Kernel(clCreateKernel(program(engine.state(), word, options).get(), kernel.c_str(), &code));
+    check(code, "clCreateKernel");
+}
+
+Launch& Launch::raw(const void* value, std::size_t size) {
+    check(clSetKernelArg(kernel_.get(), next_, size, value), "clSetKernelArg");
+    ++next_;
+    return *this;
+}
+
+Launch& Launch::arg(cl_mem mem) { return raw(&mem, sizeof mem); }
+
+Launch& Launch::arg(const View& view) {
+    arg(view.mem);
+    return arg(device::clr_layout{view.offset, view.stride, view.channels});
+}
+
+Launch& Launch::after(std::span<const cl_event> events) {
+    for (cl_event e : events)
+        if (e) waits_.push_back(e);
+    return *this;
+}
+
+Event Launch::run_ranges(std::uint64_t count) {
+    const auto& s = engine_.state();
+    const auto width = static_cast<std::uint64_t>(s.width);
+    const std::uint64_t vectors = std::max<std::uint64_t>(1, (count + width - 1) / width);
+    if (s.grouped) {
+        arg(device::clr_range{count, 0});
+        const std::uint64_t groups = std::min<std::uint64_t>((vectors + s.work_items - 1) / s.work_items, 64ull * s.info.compute_units);
+        return enqueue(groups * s.work_items, s.work_items);
+    }
+    const std::uint64_t items = std::min<std::uint64_t>(s.work_items, vectors);
+    arg(device::clr_range{count, (vectors + items - 1) / items});
+    return enqueue(items, 1);
+}
+
+Event Launch::run_groups(std::size_t groups, std::size_t size) { return enqueue(groups * size, size); }
+
+Event Launch::enqueue(std::size_t global, std::size_t local) {
+    cl_event done = nullptr;
+    const auto n = static_cast<cl_uint>(waits_.size());
+    check(clEnqueueNDRangeKernel(engine_.queue(), kernel_.get(), 1, nullptr, &global, &local, n, n ? waits_.data() : nullptr, &done),
+          "clEnqueueNDRangeKernel");
+    Event event(done);
+    check(clFlush(engine_.queue()), "clFlush");
+    save_program(engine_.state(), word_, options_, event);
+    return event;
+}
+
+}  // namespace clratio

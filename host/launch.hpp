@@ -1,0 +1,75 @@
+// Device memory and kernel launches; nothing else knows OpenCL's launch rules. Private to the library.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "clratio/device/layout.h"
+#include "clratio/engine.hpp"
+#include "clratio/view.hpp"
+#include "opencl.hpp"
+
+namespace clratio {
+
+/// Waits for an event and turns a failed kernel into a DeviceError.
+void wait(const Event& event);
+
+/// Device memory. Over host memory it is used in place where device and host share it.
+class Buffer {
+public:
+    Buffer() = default;
+    Buffer(const Engine& engine, std::size_t bytes);
+    static Buffer zeroed(const Engine& engine, std::size_t bytes);
+    static Buffer from_host(const Engine& engine, std::span<const std::byte> bytes);  ///< read by kernels
+    static Buffer onto_host(const Engine& engine, std::span<std::byte> bytes);        ///< written; see publish()
+
+    void read(std::span<std::byte> to, std::size_t offset = 0) const;
+    void write(std::span<const std::byte> from, std::size_t offset = 0) const;
+    void publish() const;  ///< makes what kernels wrote to an onto_host buffer visible to the host
+
+    cl_mem mem() const { return memory_.get(); }
+    std::size_t size() const { return size_; }
+    explicit operator bool() const { return static_cast<bool>(memory_); }
+
+private:
+    Queue queue_;
+    Memory memory_;
+    std::size_t size_ = 0;
+    std::span<std::byte> host_;
+};
+
+/// One kernel call: arguments in order, then how to run it.
+class Launch {
+public:
+    Launch(const Engine& engine, const std::string& word, const std::string& kernel, const std::string& options = "");
+
+    Launch& arg(cl_mem mem);
+    Launch& arg(const Buffer& buffer) { return arg(buffer.mem()); }
+    template <class T>
+        requires std::is_trivially_copyable_v<T>
+    Launch& arg(const T& value) {
+        return raw(&value, sizeof value);
+    }
+    Launch& local(std::size_t bytes) { return raw(nullptr, bytes); }
+    Launch& arg(const View& view);  ///< two arguments: the buffer and its clr_layout
+    Launch& after(std::span<const cl_event> events);
+
+    /// Adds a last argument, the clr_range of `count` values, and cuts them into work-items.
+    Event run_ranges(std::uint64_t count);
+    /// `groups` work-groups of `size` work-items.
+    Event run_groups(std::size_t groups, std::size_t size);
+
+private:
+    Launch& raw(const void* value, std::size_t size);
+    Event enqueue(std::size_t global, std::size_t local);
+
+    Engine engine_;
+    std::string word_, name_, options_;
+    Kernel kernel_;
+    cl_uint next_ = 0;
+    std::vector<cl_event> waits_;
+};
+
+}  // namespace clratio

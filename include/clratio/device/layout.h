@@ -1,0 +1,84 @@
+// Where value i of a view stands in its buffer, and how work is cut into ranges.
+#ifndef CLRATIO_DEVICE_LAYOUT_H
+#define CLRATIO_DEVICE_LAYOUT_H
+
+#include "clratio/device/portable.h"
+
+CLR_NAMESPACE_BEGIN
+
+// Value i is element offset + (i / channels) * stride + i % channels.
+// stride == channels: contiguous. stride == 0: the same numbers for every pixel.
+typedef struct {
+    clr_u64 offset;
+    clr_u32 stride, channels;
+} clr_layout;
+
+// How many values there are, and how many vectors of them one work-item takes.
+typedef struct {
+    clr_u64 count;     // values
+    clr_u64 per_item;  // vectors a work-item; 0 where work-items interleave
+} clr_range;
+
+#if defined(__OPENCL_C_VERSION__)
+
+typedef struct {
+    ulong begin, end, step;
+} clr_span;
+
+static inline clr_span clr_my_span(clr_range range) {
+    clr_span s;
+    const ulong vectors = (range.count + CLR_WIDTH - 1) / CLR_WIDTH;
+#if CLR_GROUPED
+    s.begin = get_global_id(0);
+    s.end = vectors;
+    s.step = get_global_size(0);
+#else
+    s.begin = min(vectors, get_global_id(0) * range.per_item);
+    s.end = min(vectors, s.begin + range.per_item);
+    s.step = 1;
+#endif
+    return s;
+}
+
+// The lanes first .. first + CLR_WIDTH - 1 of a view of `count` values; lanes past the end are 0.
+static inline clr_real clr_load_view(global const float* p, clr_layout view, ulong first, ulong count) {
+    p += view.offset;
+    if (view.stride == view.channels && first + CLR_WIDTH <= count) return clr_load(p + first);
+    if (view.stride == 0 && view.channels == 1) return (clr_real)(*p);
+    ulong pixel = first / view.channels;
+    uint channel = (uint)(first - pixel * view.channels);
+    float lane[CLR_WIDTH];
+    for (int i = 0; i < CLR_WIDTH; ++i) {
+        lane[i] = first + i < count ? p[pixel * view.stride + channel] : 0.0f;
+        if (++channel == view.channels) {
+            channel = 0;
+            ++pixel;
+        }
+    }
+    return clr_load(lane);
+}
+
+static inline void clr_store_view(clr_real v, global float* p, clr_layout view, ulong first, ulong count) {
+    p += view.offset;
+    if (view.stride == view.channels && first + CLR_WIDTH <= count) {
+        clr_store(v, p + first);
+        return;
+    }
+    ulong pixel = first / view.channels;
+    uint channel = (uint)(first - pixel * view.channels);
+    float lane[CLR_WIDTH];
+    clr_store(v, lane);
+    for (int i = 0; i < CLR_WIDTH && first + i < count; ++i) {
+        p[pixel * view.stride + channel] = lane[i];
+        if (++channel == view.channels) {
+            channel = 0;
+            ++pixel;
+        }
+    }
+}
+
+#endif
+
+CLR_NAMESPACE_END
+
+#endif

@@ -1,0 +1,140 @@
+// One vocabulary for OpenCL C 1.2 and C++: the only file that asks which compiler reads it.
+// OpenCL C: types of CLR_WIDTH lanes (1, 2, 4, 8, 16). C++: one lane, inside clratio::device.
+#ifndef CLRATIO_DEVICE_PORTABLE_H
+#define CLRATIO_DEVICE_PORTABLE_H
+
+#if defined(__OPENCL_C_VERSION__)
+
+#ifndef CLR_WIDTH
+#error "CLR_WIDTH must be 1, 2, 4, 8 or 16"
+#endif
+#ifndef CLR_GROUPED
+#error "CLR_GROUPED must be 1 (work-groups share, as on a GPU) or 0 (a range for each work-item)"
+#endif
+#ifndef CLR_FP64
+#error "CLR_FP64 must be 1 (the device has doubles) or 0"
+#endif
+
+#pragma OPENCL FP_CONTRACT OFF
+#if CLR_FP64
+#pragma OPENCL EXTENSION cl_khr_fp64 : enable
+#endif
+
+#define CLR_NAMESPACE_BEGIN
+#define CLR_NAMESPACE_END
+#define CLR_FN static inline
+#define CLR_CONSTANT constant
+#define CLR_JOIN_(a, b) a##b
+#define CLR_JOIN(a, b) CLR_JOIN_(a, b)
+
+typedef uint clr_u32;
+typedef ulong clr_u64;
+
+#if CLR_WIDTH == 1
+typedef float clr_real;
+typedef uint clr_uint;
+typedef int clr_int;
+typedef int clr_mask;
+typedef ulong clr_wide;
+#define clr_to_real(x) convert_float(x)
+#define clr_to_uint(x) convert_uint(x)
+#define clr_to_int(x) convert_int(x)
+#define clr_to_wide(x) convert_ulong(x)
+#define clr_bits(x) as_uint(x)
+#define clr_from_bits(x) as_float(x)
+#define clr_load(p) (*(p))
+#define clr_store(v, p) (*(p) = (v))
+#define clr_any(m) ((m) != 0)
+#if CLR_FP64
+typedef double clr_double;
+typedef int clr_double_mask;
+#define clr_to_double(x) convert_double(x)
+#define clr_double_from_bits(x) as_double(x)
+#define clr_double_bits(x) as_ulong(x)
+#endif
+#else
+typedef CLR_JOIN(float, CLR_WIDTH) clr_real;
+typedef CLR_JOIN(uint, CLR_WIDTH) clr_uint;
+typedef CLR_JOIN(int, CLR_WIDTH) clr_int;
+typedef CLR_JOIN(int, CLR_WIDTH) clr_mask;
+typedef CLR_JOIN(ulong, CLR_WIDTH) clr_wide;
+#define clr_to_real(x) CLR_JOIN(convert_float, CLR_WIDTH)(x)
+#define clr_to_uint(x) CLR_JOIN(convert_uint, CLR_WIDTH)(x)
+#define clr_to_int(x) CLR_JOIN(convert_int, CLR_WIDTH)(x)
+#define clr_to_wide(x) CLR_JOIN(convert_ulong, CLR_WIDTH)(x)
+#define clr_bits(x) CLR_JOIN(as_uint, CLR_WIDTH)(x)
+#define clr_from_bits(x) CLR_JOIN(as_float, CLR_WIDTH)(x)
+#define clr_load(p) CLR_JOIN(vload, CLR_WIDTH)(0, p)
+#define clr_store(v, p) CLR_JOIN(vstore, CLR_WIDTH)(v, 0, p)
+#define clr_any(m) any(m)
+#if CLR_FP64
+typedef CLR_JOIN(double, CLR_WIDTH) clr_double;
+typedef CLR_JOIN(long, CLR_WIDTH) clr_double_mask;
+#define clr_to_double(x) CLR_JOIN(convert_double, CLR_WIDTH)(x)
+#define clr_double_from_bits(x) CLR_JOIN(as_double, CLR_WIDTH)(x)
+#define clr_double_bits(x) CLR_JOIN(as_ulong, CLR_WIDTH)(x)
+#endif
+#endif
+
+#define clr_fma(a, b, c) fma(a, b, c)
+#define clr_sqrt(x) sqrt(x)
+#define clr_floor(x) floor(x)
+#define clr_abs(x) fabs(x)
+
+#else  // C++
+
+#if defined(__FAST_MATH__)
+#error "clratio's device headers promise exact bits: compile without -ffast-math"
+#endif
+
+#include <bit>
+#include <cmath>
+#include <cstdint>
+
+#define CLR_WIDTH 1
+#define CLR_FP64 1
+#define CLR_NAMESPACE_BEGIN namespace clratio::device {
+#define CLR_NAMESPACE_END }
+#define CLR_FN inline
+#define CLR_CONSTANT constexpr
+
+CLR_NAMESPACE_BEGIN
+
+using clr_u32 = std::uint32_t;
+using clr_u64 = std::uint64_t;
+using clr_real = float;
+using clr_uint = std::uint32_t;
+using clr_int = std::int32_t;
+using clr_mask = bool;
+using clr_wide = std::uint64_t;
+using clr_double = double;
+using clr_double_mask = bool;
+
+template <class T> float clr_to_real(T x) { return static_cast<float>(x); }
+template <class T> clr_uint clr_to_uint(T x) { return static_cast<clr_uint>(x); }
+template <class T> clr_int clr_to_int(T x) { return static_cast<clr_int>(x); }
+template <class T> clr_wide clr_to_wide(T x) { return static_cast<clr_wide>(x); }
+template <class T> double clr_to_double(T x) { return static_cast<double>(x); }
+inline clr_uint clr_bits(float x) { return std::bit_cast<clr_uint>(x); }
+inline float clr_from_bits(clr_uint x) { return std::bit_cast<float>(x); }
+inline clr_u64 clr_double_bits(double x) { return std::bit_cast<clr_u64>(x); }
+inline double clr_double_from_bits(clr_u64 x) { return std::bit_cast<double>(x); }
+inline bool clr_any(bool m) { return m; }
+template <class T> T clr_fma(T a, T b, T c) { return std::fma(a, b, c); }
+template <class T> T clr_sqrt(T x) { return std::sqrt(x); }
+template <class T> T clr_floor(T x) { return std::floor(x); }
+template <class T> T clr_abs(T x) { return std::fabs(x); }
+
+CLR_NAMESPACE_END
+
+#endif
+
+CLR_NAMESPACE_BEGIN
+
+#define CLR_REAL_MAX 3.402823466e+38f
+
+CLR_FN clr_mask clr_is_finite(clr_real x) { return clr_abs(x) <= (clr_real)(CLR_REAL_MAX); }
+
+CLR_NAMESPACE_END
+
+#endif

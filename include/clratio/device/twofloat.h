@@ -1,0 +1,70 @@
+// Two-float arithmetic: a value is hi + lo, |lo| <= ulp(hi)/2, about 48 bits. Needs no fp64.
+// Error-free transformations of Knuth, Dekker and Ogita-Rump-Oishi; every fma is written out.
+// Infinite or NaN parts make the result NaN. Products need |x y| > 2^-102 for an exact error term.
+#ifndef CLRATIO_DEVICE_TWOFLOAT_H
+#define CLRATIO_DEVICE_TWOFLOAT_H
+
+#include "clratio/device/portable.h"
+
+CLR_NAMESPACE_BEGIN
+
+typedef struct {
+    clr_real hi, lo;
+} clr_two;
+
+CLR_FN clr_two clr_two_make(clr_real hi, clr_real lo) {
+    clr_two r;
+    r.hi = hi;
+    r.lo = lo;
+    return r;
+}
+
+// a + b exactly, where |a| >= |b| or a == 0.
+CLR_FN clr_two clr_two_quick_sum(clr_real a, clr_real b) {
+    const clr_real s = a + b;
+    return clr_two_make(s, b - (s - a));
+}
+
+// a + b exactly.
+CLR_FN clr_two clr_two_sum(clr_real a, clr_real b) {
+    const clr_real s = a + b;
+    const clr_real v = s - a;
+    return clr_two_make(s, (a - (s - v)) + (b - v));
+}
+
+// a * b exactly.
+CLR_FN clr_two clr_two_product(clr_real a, clr_real b) {
+    const clr_real p = a * b;
+    return clr_two_make(p, clr_fma(a, b, -p));
+}
+
+// x + y, relative error below 2^-46 of |x| + |y|.
+CLR_FN clr_two clr_two_add(clr_two x, clr_two y) {
+    const clr_two s = clr_two_sum(x.hi, y.hi);
+    return clr_two_quick_sum(s.hi, s.lo + (x.lo + y.lo));
+}
+
+CLR_FN clr_two clr_two_negate(clr_two x) { return clr_two_make(-x.hi, -x.lo); }
+
+// a - y, for a plain a.
+CLR_FN clr_two clr_two_subtract_from(clr_real a, clr_two y) {
+    const clr_two s = clr_two_sum(a, -y.hi);
+    return clr_two_quick_sum(s.hi, s.lo - y.lo);
+}
+
+// x * y, relative error below 2^-44.
+CLR_FN clr_two clr_two_multiply(clr_two x, clr_two y) {
+    const clr_two p = clr_two_product(x.hi, y.hi);
+    return clr_two_quick_sum(p.hi, clr_fma(x.hi, y.lo, clr_fma(x.lo, y.hi, p.lo)));
+}
+
+// x / y, relative error below 2^-43; y.hi != 0.
+CLR_FN clr_two clr_two_divide(clr_two x, clr_two y) {
+    const clr_real q = x.hi / y.hi;
+    const clr_real remainder = clr_fma(-q, y.hi, x.hi) + clr_fma(-q, y.lo, x.lo);
+    return clr_two_quick_sum(q, remainder / y.hi);
+}
+
+CLR_NAMESPACE_END
+
+#endif

@@ -1,0 +1,73 @@
+// clratio::io: images in and out of OpenEXR files.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "clratio/combine.hpp"
+
+namespace clratio {
+
+/// An inclusive pixel rectangle, as OpenEXR stores windows.
+struct Window {
+    int x0 = 0, y0 = 0, x1 = -1, y1 = -1;
+    bool operator==(const Window&) const = default;
+};
+
+/// Interleaved float32 values of the colour channels of one layer; alpha stands aside.
+class Image {
+public:
+    Image() = default;
+
+    std::vector<std::string> channels;  ///< without the layer: {"R", "G", "B"} or {"Y"}
+    std::vector<float> values;          ///< channels.size() a pixel, rows from the top
+    std::vector<float> alpha;           ///< one a pixel, or empty
+    Window data_window, display_window;
+    std::string path, layer;            ///< where it came from; both empty for an image made here
+
+    /// What else the file's header said (attributes), carried to the file written from this image.
+    struct Metadata;
+    std::shared_ptr<const Metadata> metadata;
+
+    int width() const { return data_window.x1 - data_window.x0 + 1; }
+    int height() const { return data_window.y1 - data_window.y0 + 1; }
+    std::uint64_t size() const { return values.size(); }
+    operator std::span<const float>() const { return values; }
+    operator Tau() const { return Tau(std::span<const float>(values)); }
+};
+
+/// Reads half, float or uint; Y, RGB, RGBA or named channels; scanline, tiled or multi-part; any compression.
+/// `spec` is "FILE" or "FILE:LAYER"; `layer` is used where spec names none. With one colour layer in the file it is
+/// found without asking. Errors: IoError with path, layer and reason: missing, damaged, subsampled, deep, no such layer,
+/// several layers and none named (they are listed).
+Image read_image(const std::string& spec, const std::string& layer = "");
+
+struct WriteOptions {
+    std::vector<std::pair<std::string, std::string>> attributes;  ///< string attributes to add, e.g. {"clratio/estimator", "ratio"}
+};
+
+/// Writes float32 channels (and alpha where there is one), ZIP, with windows and metadata of the image. Written beside `path`
+/// through checked writes, synced, reopened and compared, then renamed over it: either the whole new file stands there or
+/// what was there before. Errors: IoError.
+void write_image(const std::filesystem::path& path, const Image& image, const WriteOptions& options = {});
+
+/// The same for a flag image: one UINT channel for each channel of `like`.
+void write_flags(const std::filesystem::path& path, const Image& like, std::span<const std::uint32_t> flags,
+                 const WriteOptions& options = {});
+
+/// Throws InvalidArgument naming both files where windows or channels differ.
+void require_same_shape(const Image& a, const Image& b);
+
+/// A read-out in the shape of an image.
+struct CombinedImage {
+    Image estimate, standard_error;
+    std::vector<std::uint32_t> flag_image;
+    FlagCounts flags;
+};
+CombinedImage combine(const Moments& moments, const Image& tau, CombineOptions options = {});
+
+}  // namespace clratio
