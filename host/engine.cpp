@@ -24,8 +24,7 @@ struct Found {
     DeviceInfo info;
 };
 
-template <class Get, class Object>
-std::string text(Get get, Object object, cl_uint what) {
+template <class Get, class Object> std::string text(Get get, Object object, cl_uint what) {
     std::size_t size = 0;
     if (get(object, what, 0, nullptr, &size) != CL_SUCCESS || size == 0) return "";
     std::string s(size, '\0');
@@ -34,8 +33,7 @@ std::string text(Get get, Object object, cl_uint what) {
     return s;
 }
 
-template <class T>
-T number(cl_device_id device, cl_device_info what) {
+template <class T> T number(cl_device_id device, cl_device_info what) {
     T value{};
     const cl_int code = clGetDeviceInfo(device, what, sizeof value, &value, nullptr);
     return code == CL_SUCCESS ? value : T{};
@@ -158,8 +156,8 @@ Engine::Engine(EngineOptions options) : state_(std::make_shared<State>()) {
     s.device = found.device;
     s.info = found.info;
     cl_int code = CL_SUCCESS;
-    const std::array<cl_context_properties, 3> properties{
-        CL_CONTEXT_PLATFORM, reinterpret_cast<cl_context_properties>(found.platform), 0};
+    const std::array<cl_context_properties, 3> properties{CL_CONTEXT_PLATFORM,
+                                                          reinterpret_cast<cl_context_properties>(found.platform), 0};
     s.context = Context(clCreateContext(properties.data(), 1, &s.device, nullptr, nullptr, &code));
     check(code, "clCreateContext");
     s.queue = Queue(clCreateCommandQueue(s.context.get(), s.device, 0, &code));

@@ -4,8 +4,9 @@
 
 namespace clratio {
 
-#define CLR_CODE(name) \
-    case name: return #name
+#define CLR_CODE(name)                                                                                                      \
+    case name:                                                                                                              \
+        return #name
 
 const char* code_name(cl_int code) {
     switch (code) {
@@ -53,8 +54,10 @@ const char* code_name(cl_int code) {
         CLR_CODE(CL_INVALID_BUFFER_SIZE);
         CLR_CODE(CL_INVALID_GLOBAL_WORK_SIZE);
         CLR_CODE(CL_INVALID_PROPERTY);
-        case -1001: return "CL_PLATFORM_NOT_FOUND_KHR";
-        default: return "unknown OpenCL code";
+    case -1001:
+        return "CL_PLATFORM_NOT_FOUND_KHR";
+    default:
+        return "unknown OpenCL code";
     }
 }
 

@@ -16,7 +16,8 @@ namespace {
 Memory allocate(const Engine& engine, cl_mem_flags flags, std::size_t bytes, void* host) {
     const auto largest = engine.info().largest_allocation;
     if (largest && bytes > largest)
-        throw InvalidArgument("device memory", "at most " + std::to_string(largest) + " bytes in one buffer on " + engine.info().name,
+        throw InvalidArgument("device memory",
+                              "at most " + std::to_string(largest) + " bytes in one buffer on " + engine.info().name,
                               std::to_string(bytes));
     cl_int code = CL_SUCCESS;
     Memory memory(clCreateBuffer(engine.context(), flags, std::max<std::size_t>(bytes, 1), host, &code));
@@ -33,7 +34,8 @@ Buffer Buffer::zeroed(const Engine& engine, std::size_t bytes) {
     Buffer b(engine, bytes);
     const cl_uint zero = 0;
     cl_event filled = nullptr;
-    check(clEnqueueFillBuffer(b.queue_.get(), b.mem(), &zero, sizeof zero, 0, bytes, 0, nullptr, &filled), "clEnqueueFillBuffer");
+    check(clEnqueueFillBuffer(b.queue_.get(), b.mem(), &zero, sizeof zero, 0, bytes, 0, nullptr, &filled),
+          "clEnqueueFillBuffer");
     wait(Event(filled));
     return b;
 }
@@ -62,7 +64,8 @@ Buffer Buffer::onto_host(const Engine& engine, std::span<std::byte> bytes) {
 
 void Buffer::read(std::span<std::byte> to, std::size_t offset) const {
     if (to.empty()) return;
-    check(clEnqueueReadBuffer(queue_.get(), mem(), CL_TRUE, offset, to.size(), to.data(), 0, nullptr, nullptr), "clEnqueueReadBuffer");
+    check(clEnqueueReadBuffer(queue_.get(), mem(), CL_TRUE, offset, to.size(), to.data(), 0, nullptr, nullptr),
+          "clEnqueueReadBuffer");
 }
 
 void Buffer::write(std::span<const std::byte> from, std::size_t offset) const {
@@ -82,6 +85,41 @@ void Buffer::publish() const {
     wait(Event(unmapped));
 }
 
+namespace {
+
+std::uint64_t most_groups(const Engine::State& s) { return 64ull * std::max(1u, s.info.compute_units); }
+
+bool same_elements(const View& a, const View& b) {
+    return a.offset == b.offset && a.stride == b.stride && a.channels == b.channels;
+}
+
+}  // namespace
+
+std::size_t most_work_items(const Engine& engine) {
+    const auto& s = engine.state();
+    return s.work_items * (s.grouped ? most_groups(s) : 1);
+}
+
+device::clr_layout layout(const View& v) { return {v.offset, v.stride, v.channels}; }
+
+void check_view(const char* name, const View& view, std::uint64_t count) {
+    if (!view.mem) throw InvalidArgument(name, "a device buffer", "null");
+    if (view.count != count) throw InvalidArgument(name, std::to_string(count) + " values", std::to_string(view.count));
+    if (view.channels == 0) throw InvalidArgument(name, "at least one channel", "0");
+    std::size_t bytes = 0;
+    check(clGetMemObjectInfo(view.mem, CL_MEM_SIZE, sizeof bytes, &bytes, nullptr), "clGetMemObjectInfo");
+    if (view.end() > bytes / sizeof(float))
+        throw InvalidArgument(name, "a view inside its buffer of " + std::to_string(bytes / sizeof(float)) + " elements",
+                              "one that ends at " + std::to_string(view.end()));
+}
+
+void check_overlap(const char* name, const View& output, const char* other_name, const View& other) {
+    if (output.mem != other.mem || same_elements(output, other)) return;
+    if (output.offset < other.end() && other.offset < output.end())
+        throw InvalidArgument(name, std::string("a view apart from ") + other_name + ", or the very same",
+                              "one that overlaps it");
+}
+
 Launch::Launch(const Engine& engine, const std::string& word, const std::string& kernel, const std::string& options)
     : engine_(engine), word_(word), name_(kernel), options_(options) {
     cl_int code = CL_SUCCESS;
@@ -97,10 +135,7 @@ Launch& Launch::raw(const void* value, std::size_t size) {
 
 Launch& Launch::arg(cl_mem mem) { return raw(&mem, sizeof mem); }
 
-Launch& Launch::arg(const View& view) {
-    arg(view.mem);
-    return arg(device::clr_layout{view.offset, view.stride, view.channels});
-}
+Launch& Launch::view(const View& v) { return arg(v.mem).arg(layout(v)); }
 
 Launch& Launch::after(std::span<const cl_event> events) {
     for (cl_event e : events)
@@ -114,7 +149,7 @@ Event Launch::run_ranges(std::uint64_t count) {
     const std::uint64_t vectors = std::max<std::uint64_t>(1, (count + width - 1) / width);
     if (s.grouped) {
         arg(device::clr_range{count, 0});
-        const std::uint64_t groups = std::min<std::uint64_t>((vectors + s.work_items - 1) / s.work_items, 64ull * s.info.compute_units);
+        const std::uint64_t groups = std::min<std::uint64_t>((vectors + s.work_items - 1) / s.work_items, most_groups(s));
         return enqueue(groups * s.work_items, s.work_items);
     }
     const std::uint64_t items = std::min<std::uint64_t>(s.work_items, vectors);
@@ -127,7 +162,8 @@ Event Launch::run_groups(std::size_t groups, std::size_t size) { return enqueue(
 Event Launch::enqueue(std::size_t global, std::size_t local) {
     cl_event done = nullptr;
     const auto n = static_cast<cl_uint>(waits_.size());
-    check(clEnqueueNDRangeKernel(engine_.queue(), kernel_.get(), 1, nullptr, &global, &local, n, n ? waits_.data() : nullptr, &done),
+    check(clEnqueueNDRangeKernel(engine_.queue(), kernel_.get(), 1, nullptr, &global, &local, n, n ? waits_.data() : nullptr,
+                                 &done),
           "clEnqueueNDRangeKernel");
     Event event(done);
     check(clFlush(engine_.queue()), "clFlush");

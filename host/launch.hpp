@@ -40,6 +40,16 @@ private:
     std::span<std::byte> host_;
 };
 
+device::clr_layout layout(const View& view);
+
+/// The most work-items that run_ranges() starts: how many rows a kernel's counters need.
+std::size_t most_work_items(const Engine& engine);
+
+/// Throws InvalidArgument unless the view holds `count` values inside its buffer.
+void check_view(const char* name, const View& view, std::uint64_t count);
+/// Throws InvalidArgument where an output shares elements with another view without being the same view.
+void check_overlap(const char* name, const View& output, const char* other_name, const View& other);
+
 /// One kernel call: arguments in order, then how to run it.
 class Launch {
 public:
@@ -48,12 +58,10 @@ public:
     Launch& arg(cl_mem mem);
     Launch& arg(const Buffer& buffer) { return arg(buffer.mem()); }
     template <class T>
-        requires std::is_trivially_copyable_v<T>
-    Launch& arg(const T& value) {
-        return raw(&value, sizeof value);
-    }
+    requires std::is_trivially_copyable_v<T> Launch& arg(const T& value) { return raw(&value, sizeof value); }
+    /// A view's buffer and its clr_layout, two arguments.
+    Launch& view(const View& v);
     Launch& local(std::size_t bytes) { return raw(nullptr, bytes); }
-    Launch& arg(const View& view);  ///< two arguments: the buffer and its clr_layout
     Launch& after(std::span<const cl_event> events);
 
     /// Adds a last argument, the clr_range of `count` values, and cuts them into work-items.

@@ -17,8 +17,7 @@ inline void check(cl_int code, const char* call) {
 }
 
 /// Owns one reference to an OpenCL object.
-template <class T, cl_int(CL_API_CALL* retain)(T), cl_int(CL_API_CALL* release)(T)>
-class Handle {
+template <class T, cl_int(CL_API_CALL* retain)(T), cl_int(CL_API_CALL* release)(T)> class Handle {
 public:
     Handle() = default;
     explicit Handle(T owned) : value_(owned) {}

@@ -10,14 +10,17 @@ namespace clratio {
 namespace {
 
 const EmbeddedFile* find_file(std::string_view path) {
-    const auto f = std::find_if(embedded_files.begin(), embedded_files.end(), [&](const EmbeddedFile& e) { return e.path == path; });
+    const auto f =
+        std::find_if(embedded_files.begin(), embedded_files.end(), [&](const EmbeddedFile& e) { return e.path == path; });
     return f == embedded_files.end() ? nullptr : &*f;
 }
 
 void flatten(const EmbeddedFile& file, std::set<std::string_view>& done, std::string& out) {
     if (!done.insert(file.path).second) return;
     constexpr std::string_view include = "#include \"";
-    const auto locate = [&](std::size_t line) { out += "#line " + std::to_string(line) + " \"" + std::string(file.path) + "\"\n"; };
+    const auto locate = [&](std::size_t line) {
+        out += "#line " + std::to_string(line) + " \"" + std::string(file.path) + "\"\n";
+    };
     locate(1);
     std::size_t line = 0;
     for (std::string_view rest = file.text; !rest.empty();) {
@@ -44,7 +47,8 @@ std::string build_options(const Engine::State& s, const std::string& extra) {
     return extra.empty() ? o : o + " " + extra;
 }
 
-std::string cache_key(const Engine::State& s, const std::string& word, const std::string& options, const std::string& source) {
+std::string cache_key(const Engine::State& s, const std::string& word, const std::string& options,
+                      const std::string& source) {
     const auto& d = s.info;
     return d.platform + "|" + d.name + "|" + d.version + "|" + d.driver + "|" + word + "|" + options + "|" +
            std::to_string(cache::fnv1a(source.data(), source.size()));

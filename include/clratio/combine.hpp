@@ -17,7 +17,8 @@ namespace clratio {
 enum class Estimator {
     ratio,           ///< tau mean(m) / mean(t), eq. (10); consistent, bias O(1/N)
     mean,            ///< mean(m); unbiased, tau and t unused
-    mean_of_ratios,  ///< mean of finished ratios, eq. (5): a bias that no number of batches removes. Needs MomentsOptions::ratios
+    mean_of_ratios,  ///< mean of finished ratios, eq. (5): a bias that no number of batches removes. Needs
+                     ///< MomentsOptions::ratios
 };
 
 /// What stands where the mean of t is 0 and tau is not.
@@ -32,21 +33,22 @@ struct CombineOptions {
 /// How many values carry each flag; the CLR_FLAG_* bits of device/ratio.h name them.
 struct FlagCounts {
     std::uint64_t zero_denominator = 0, zero_tau = 0, skipped = 0, no_data = 0, no_error_bar = 0, nonfinite = 0;
-    std::uint64_t any = 0;               ///< values with at least one of them
+    std::uint64_t any = 0;  ///< values with at least one of them
     std::uint64_t total() const { return any; }
 };
 
 struct Combined {
     std::vector<float> estimate;
-    std::vector<float> standard_error;     ///< empty unless asked for
-    std::vector<std::uint32_t> flag_image; ///< a bit mask for each value
+    std::vector<float> standard_error;      ///< empty unless asked for
+    std::vector<std::uint32_t> flag_image;  ///< a bit mask for each value
     FlagCounts flags;
 };
 
 /// tau: one number, one for each of `channels` interleaved channels, or one for each value.
 struct Tau {
     Tau(float number) : numbers{number}, channels(1) {}
-    Tau(std::vector<float> each_channel) : numbers(std::move(each_channel)), channels(static_cast<std::uint32_t>(numbers.size())) {}
+    Tau(std::vector<float> each_channel)
+        : numbers(std::move(each_channel)), channels(static_cast<std::uint32_t>(numbers.size())) {}
     Tau(std::span<const float> each_value) : image(each_value) {}
     std::vector<float> numbers;
     std::uint32_t channels = 1;

@@ -16,7 +16,7 @@ namespace clratio {
 
 struct DeviceInfo {
     std::string platform, name, vendor, version, driver;
-    std::string id;  ///< "platform:device", both counted from 0, as CLRATIO_DEVICE takes it
+    std::string id;           ///< "platform:device", both counted from 0, as CLRATIO_DEVICE takes it
     cl_device_type type = 0;  ///< a bit mask
     std::uint32_t compute_units = 0;
     std::uint64_t global_memory = 0, largest_allocation = 0;  ///< bytes
@@ -66,8 +66,8 @@ public:
     cl_command_queue queue() const;
     cl_context context() const;
     cl_device_id device() const;
-    int width() const;    ///< lanes
-    bool grouped() const; ///< true where work-groups share (GPU path)
+    int width() const;     ///< lanes
+    bool grouped() const;  ///< true where work-groups share (GPU path)
     std::uint32_t work_items() const;
 
     /// Runs 64 values through + - * / sqrt fma on the device and compares the bits with the host's.

@@ -32,7 +32,8 @@ public:
 class BuildError : public Error {
 public:
     BuildError(const std::string& kernel_word, const std::string& build_log)
-        : Error("kernels/" + kernel_word + ".cl does not build on this device:\n" + build_log), word(kernel_word), log(build_log) {}
+        : Error("kernels/" + kernel_word + ".cl does not build on this device:\n" + build_log), word(kernel_word),
+          log(build_log) {}
     std::string word, log;
 };
 
@@ -40,7 +41,8 @@ public:
 class IoError : public Error {
 public:
     IoError(const std::string& file, const std::string& file_layer, const std::string& why)
-        : Error(file + (file_layer.empty() ? "" : ":" + file_layer) + ": " + why), path(file), layer(file_layer), reason(why) {}
+        : Error(file + (file_layer.empty() ? "" : ":" + file_layer) + ": " + why), path(file), layer(file_layer),
+          reason(why) {}
     std::string path, layer, reason;
 };
 

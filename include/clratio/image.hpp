@@ -27,7 +27,7 @@ public:
     std::vector<float> values;          ///< channels.size() a pixel, rows from the top
     std::vector<float> alpha;           ///< one a pixel, or empty
     Window data_window, display_window;
-    std::string path, layer;            ///< where it came from; both empty for an image made here
+    std::string path, layer;  ///< where it came from; both empty for an image made here
 
     /// What else the file's header said (attributes), carried to the file written from this image.
     struct Metadata;
@@ -47,12 +47,13 @@ public:
 Image read_image(const std::string& spec, const std::string& layer = "");
 
 struct WriteOptions {
-    std::vector<std::pair<std::string, std::string>> attributes;  ///< string attributes to add, e.g. {"clratio/estimator", "ratio"}
+    std::vector<std::pair<std::string, std::string>>
+        attributes;  ///< string attributes to add, e.g. {"clratio/estimator", "ratio"}
 };
 
-/// Writes float32 channels (and alpha where there is one), ZIP, with windows and metadata of the image. Written beside `path`
-/// through checked writes, synced, reopened and compared, then renamed over it: either the whole new file stands there or
-/// what was there before. Errors: IoError.
+/// Writes float32 channels (and alpha where there is one), ZIP, with windows and metadata of the image. Written beside
+/// `path` through checked writes, synced, reopened and compared, then renamed over it: either the whole new file stands
+/// there or what was there before. Errors: IoError.
 void write_image(const std::filesystem::path& path, const Image& image, const WriteOptions& options = {});
 
 /// The same for a flag image: one UINT channel for each channel of `like`.

@@ -33,31 +33,35 @@ struct HostBatch {
     double weight = 1;
 };
 
-/// Planes of float32, each of plane_stride() elements, one after the other from `offset` on in `mem`:
-/// mean m, mean t, M2 m, M2 t, C mt, each as hi then lo; with NonFinite::skip then weight hi, lo and batches (uint32);
-/// with ratios then mean of m/t, mean of m where t = 0, share of weight where t = 0, each as hi then lo.
-struct StateView {
-    cl_mem mem = nullptr;
-    std::uint64_t offset = 0;  ///< elements
+/// The device buffers of a state. A plane is plane_stride() float32 of hi parts, then as many lo parts; `batches` is a
+/// single plane_stride() of uint32. weight and batches exist with NonFinite::skip, the last three with `ratios`, and are
+/// null otherwise.
+struct StatePlanes {
+    cl_mem m = nullptr, t = nullptr;                                    ///< means
+    cl_mem mm = nullptr, tt = nullptr, mt = nullptr;                    ///< second moments about the means
+    cl_mem weight = nullptr, batches = nullptr;                         ///< of each value
+    cl_mem quotient = nullptr, zero_m = nullptr, zero_share = nullptr;  ///< means of m/t; of m, and of 1, where t = 0
 };
 
-/// Two-float difference-form Welford/Chan moments of (m, t), theory: Chan, Golub, LeVeque 1979, with sample counts as weights.
+/// Two-float difference-form Welford/Chan moments of (m, t), theory: Chan, Golub, LeVeque 1979, with sample counts as
+/// weights.
 ///
 /// Shapes: every batch has size() values. Units: those of m and t.
 /// NaN and infinity: by NonFinite. Zero t: accepted. Negative values: accepted, counted by negatives().
 /// Weights: finite and positive, else InvalidArgument; the sum is exact for integers below 2^48.
 /// Determinism: the same batches in the same order give the same bits at every width and work size, and however
 /// many are added in one call; another grouping, merged, agrees within 2 ulp of the estimate.
-/// Cost: state_bytes() on the device; a batch moves 8 bytes a value in and the state in and out once a call of up to 8.
-/// Not for concurrent use of one object; several objects may share an Engine across threads.
+/// Cost: state_bytes() on the device (40 bytes a value, 52 with skip); 8 batches a launch, which reads and writes the state
+/// once. Not for concurrent use of one object; several objects may share an Engine across threads.
 class Moments {
 public:
     Moments(const Engine& engine, std::uint64_t values, MomentsOptions options = {});
-    /// On the caller's memory of state_bytes(), zeroed, which must outlive this.
-    Moments(const Engine& engine, std::uint64_t values, MomentsOptions options, StateView memory);
+    /// On the caller's buffers, of plane_bytes() each (`batches`: half of it), filled with zeros; they are retained.
+    Moments(const Engine& engine, std::uint64_t values, MomentsOptions options, const StatePlanes& planes);
 
-    static std::uint64_t state_bytes(std::uint64_t values, MomentsOptions options = {});
     static std::uint64_t plane_stride(std::uint64_t values);  ///< elements
+    static std::uint64_t plane_bytes(std::uint64_t values);
+    static std::uint64_t state_bytes(std::uint64_t values, MomentsOptions options = {});  ///< of all planes
 
     /// Blocking. Spans of size() floats on the host.
     void add(std::span<const float> m, std::span<const float> t, double weight = 1);
@@ -65,7 +69,7 @@ public:
     /// Event form: enqueues and returns; the caller releases the event. NonFinite::fail is not possible here.
     cl_event add(std::span<const Batch> batches, std::span<const cl_event> wait_list);
 
-    /// Chan's merge: as if other's batches had been added after these. Errors: another size, options or context.
+    /// Chan's merge: as if other's batches had been added after these. Errors: another size, options or Engine.
     void merge(const Moments& other);
     cl_event merge(const Moments& other, std::span<const cl_event> wait_list);
 
@@ -79,8 +83,10 @@ public:
     std::uint64_t negatives() const;
     std::uint64_t skipped() const;
 
-    /// The planes as they are on the device, for tests and for saving.
-    std::vector<std::uint32_t> bits() const;
+    /// The values of a plane in its own order, hi parts then lo parts without padding, as bits; empty where the state lacks
+    /// it.
+    std::vector<std::uint32_t> bits(cl_mem StatePlanes::*plane) const;
+    StatePlanes planes() const;
 
     struct State;
     State& state() const { return *state_; }

@@ -32,9 +32,9 @@ struct View {
 
 /// A view of any wrapper whose call operator yields the cl_mem, as cl::Buffer's does.
 template <class Buffer>
-    requires requires(const Buffer& b) {
-        { b() } -> std::convertible_to<cl_mem>;
-    }
+requires requires(const Buffer& b) {
+    { b() } -> std::convertible_to<cl_mem>;
+}
 View view_of(const Buffer& buffer, std::uint64_t count, std::uint64_t offset = 0, std::uint32_t stride = 1,
              std::uint32_t channels = 1) {
     return {buffer(), offset, count, stride, channels};

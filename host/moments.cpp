@@ -1,0 +1,243 @@
+#include "clratio/moments.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "moments_state.hpp"
+
+namespace clratio {
+namespace {
+
+using device::clr_two;
+
+constexpr std::uint64_t widest = 16;  // lanes; planes are padded to it, so that kernels load and store whole vectors
+
+clr_two two_float(double x) {
+    const auto hi = static_cast<float>(x);
+    return {hi, static_cast<float>(x - static_cast<double>(hi))};
+}
+
+device::clr_batch describe(const Batch& b, clr_two weight_before) {
+    const clr_two added = two_float(b.weight);
+    const auto entry = device::clr_entry_make(weight_before, added, device::clr_two_add(weight_before, added));
+    return {layout(b.m), layout(b.t), added.hi, added.lo, entry.share.hi, entry.share.lo, entry.spread.hi, entry.spread.lo};
+}
+
+void check_weight(double weight) {
+    if (!(weight > 0) || weight > 1e30)
+        throw InvalidArgument("weight", "a finite sample count above 0", std::to_string(weight));
+}
+
+void check_room(std::uint64_t batches, std::uint64_t more) {
+    constexpr std::uint64_t most = std::numeric_limits<std::uint32_t>::max();
+    if (more > most - batches)
+        throw InvalidArgument("batches", "at most 2^32 - 1 in one state", std::to_string(batches + more));
+}
+
+std::uint64_t count_nonfinite(const Engine& engine, const View& m, const View& t) {
+    const std::size_t bytes = most_work_items(engine) * sizeof(std::uint64_t);
+    const Buffer rows = Buffer::zeroed(engine, bytes);
+    wait(Launch(engine, "moments", "clr_scan").view(m).view(t).arg(rows).run_ranges(m.count));
+    std::vector<std::uint64_t> counts(bytes / sizeof(std::uint64_t));
+    rows.read(std::as_writable_bytes(std::span(counts)));
+    std::uint64_t sum = 0;
+    for (auto c : counts) sum += c;
+    return sum;
+}
+
+void refuse_nonfinite(const Engine& engine, std::span<const Batch> batches) {
+    for (std::size_t k = 0; k < batches.size(); ++k)
+        if (const auto bad = count_nonfinite(engine, batches[k].m, batches[k].t))
+            throw InvalidArgument("batch " + std::to_string(k), "finite values",
+                                  std::to_string(bad) + " NaN or infinite ones");
+}
+
+std::uint64_t tally(const Moments::State& s, std::size_t which) {
+    wait(s.last);
+    std::vector<std::uint64_t> rows(s.add_rows.size() / sizeof(std::uint64_t));
+    s.add_rows.read(std::as_writable_bytes(std::span(rows)));
+    std::uint64_t sum = 0;
+    for (std::size_t i = which; i < rows.size(); i += CLR_TALLY_ADD) sum += rows[i];
+    return sum;
+}
+
+std::vector<cl_mem StatePlanes::*> planes_of(MomentsOptions o) {
+    using P = StatePlanes;
+    std::vector<cl_mem P::*> all{&P::m, &P::t, &P::mm, &P::tt, &P::mt};
+    if (o.nonfinite == NonFinite::skip) all.insert(all.end(), {&P::weight, &P::batches});
+    if (o.ratios) all.insert(all.end(), {&P::quotient, &P::zero_m, &P::zero_share});
+    return all;
+}
+
+std::uint64_t bytes_of(cl_mem StatePlanes::*plane, std::uint64_t values) {
+    return Moments::plane_bytes(values) / (plane == &StatePlanes::batches ? 2 : 1);
+}
+
+std::shared_ptr<Moments::State> make_state(const Engine& engine, std::uint64_t values, MomentsOptions options) {
+    if (values == 0) throw InvalidArgument("values", "at least 1", "0");
+    auto s = std::make_shared<Moments::State>(engine, values, options);
+    s->add_rows = Buffer::zeroed(engine, most_work_items(engine) * CLR_TALLY_ADD * sizeof(std::uint64_t));
+    return s;
+}
+
+}  // namespace
+
+device::clr_state Moments::State::header() const {
+    const std::uint32_t kinds =
+        (options.nonfinite == NonFinite::skip ? CLR_STATE_PER_VALUE : 0u) | (options.ratios ? CLR_STATE_RATIOS : 0u);
+    return {plane_stride(values), kinds, static_cast<std::uint32_t>(batches), weight.hi, weight.lo};
+}
+
+Launch& Moments::State::give_planes(Launch& launch) const {
+    for (cl_mem p : {planes.m, planes.t, planes.mm, planes.tt, planes.mt, planes.weight, planes.batches, planes.quotient,
+                     planes.zero_m, planes.zero_share})
+        launch.arg(p);
+    return launch.arg(header());
+}
+
+Event add_batches(Moments::State& s, std::span<const Batch> batches, const Reading* reading,
+                  std::span<const cl_event> waits) {
+    check_room(s.batches, batches.size());
+    device::clr_batches table{};
+    table.count = static_cast<std::uint32_t>(batches.size());
+    clr_two weight = s.weight;
+    Launch launch(s.engine, "moments", "clr_add");
+    for (std::size_t k = 0; k < CLR_BATCHES_PER_LAUNCH; ++k) {
+        const Batch& b = batches[std::min(k, batches.size() - 1)];
+        launch.arg(b.m.mem).arg(b.t.mem);
+        if (k >= batches.size()) continue;
+        table.of[k] = describe(b, weight);
+        weight = device::clr_two_add(weight, two_float(b.weight));
+    }
+    s.give_planes(launch.arg(table)).arg(s.add_rows);
+    (reading ? *reading : Reading{}).give(launch);
+    s.last = launch.after(waits).after(std::array{s.last.get()}).run_ranges(s.values);
+    s.batches += batches.size();
+    s.weight = weight;
+    return s.last;
+}
+
+void check_batches(const Moments::State& s, std::span<const Batch> batches) {
+    if (s.options.nonfinite == NonFinite::fail)
+        throw InvalidArgument("NonFinite::fail", "a blocking add, which can look at the batch first", "the event form");
+    for (const auto& b : batches) {
+        check_weight(b.weight);
+        check_view("m", b.m, s.values);
+        check_view("t", b.t, s.values);
+    }
+}
+
+Moments::Moments(const Engine& engine, std::uint64_t values, MomentsOptions options)
+    : state_(make_state(engine, values, options)) {
+    for (auto plane : planes_of(options)) {
+        const Buffer b = Buffer::zeroed(engine, bytes_of(plane, values));
+        state_->planes.*plane = b.mem();
+        state_->owned.push_back(Memory::share(b.mem()));
+    }
+}
+
+Moments::Moments(const Engine& engine, std::uint64_t values, MomentsOptions options, const StatePlanes& planes)
+    : state_(make_state(engine, values, options)) {
+    for (auto plane : planes_of(options)) {
+        check_view("state plane", {planes.*plane, 0, bytes_of(plane, values) / sizeof(float)},
+                   bytes_of(plane, values) / sizeof(float));
+        state_->planes.*plane = planes.*plane;
+        state_->owned.push_back(Memory::share(planes.*plane));
+    }
+}
+
+std::uint64_t Moments::plane_stride(std::uint64_t values) { return (values + widest - 1) / widest * widest; }
+std::uint64_t Moments::plane_bytes(std::uint64_t values) { return plane_stride(values) * 2 * sizeof(float); }
+
+std::uint64_t Moments::state_bytes(std::uint64_t values, MomentsOptions options) {
+    std::uint64_t sum = 0;
+    for (auto plane : planes_of(options)) sum += bytes_of(plane, values);
+    return sum;
+}
+
+void Moments::add(std::span<const float> m, std::span<const float> t, double weight) {
+    const HostBatch batch{m, t, weight};
+    add(std::span(&batch, 1));
+}
+
+void Moments::add(std::span<const HostBatch> batches) {
+    auto& s = *state_;
+    std::vector<Buffer> memory;
+    std::vector<Batch> views;
+    for (const auto& b : batches) {
+        check_weight(b.weight);
+        for (const auto& [name, values] : {std::pair{"m", b.m}, std::pair{"t", b.t}}) {
+            if (values.size() != s.values)
+                throw InvalidArgument(name, std::to_string(s.values) + " values", std::to_string(values.size()));
+            memory.push_back(Buffer::from_host(s.engine, std::as_bytes(values)));
+        }
+        const std::size_t last = memory.size() - 1;
+        views.push_back({{memory[last - 1].mem(), 0, s.values}, {memory[last].mem(), 0, s.values}, b.weight});
+    }
+    if (s.options.nonfinite == NonFinite::fail) refuse_nonfinite(s.engine, views);
+    check_room(s.batches, views.size());
+    for (std::span<const Batch> rest = views; !rest.empty();) {
+        const auto now = rest.first(std::min<std::size_t>(rest.size(), CLR_BATCHES_PER_LAUNCH));
+        wait(add_batches(s, now, nullptr, {}));
+        rest = rest.subspan(now.size());
+    }
+}
+
+cl_event Moments::add(std::span<const Batch> batches, std::span<const cl_event> wait_list) {
+    auto& s = *state_;
+    if (batches.empty()) throw InvalidArgument("batches", "at least one", "none");
+    check_batches(s, batches);
+    check_room(s.batches, batches.size());
+    Event done;
+    while (!batches.empty()) {
+        const auto now = batches.first(std::min<std::size_t>(batches.size(), CLR_BATCHES_PER_LAUNCH));
+        done = add_batches(s, now, nullptr, wait_list);
+        batches = batches.subspan(now.size());
+    }
+    return done.give();
+}
+
+cl_event Moments::merge(const Moments& other, std::span<const cl_event> wait_list) {
+    auto& a = *state_;
+    const auto& b = *other.state_;
+    if (a.values != b.values) throw InvalidArgument("merge", std::to_string(a.values) + " values", std::to_string(b.values));
+    if (&a.engine.state() != &b.engine.state()) throw InvalidArgument("merge", "a state on the same Engine", "another's");
+    if (a.options.nonfinite != b.options.nonfinite || a.options.ratios != b.options.ratios)
+        throw InvalidArgument("merge", "a state with the same options", "others");
+    check_room(a.batches, b.batches);
+    Launch launch(a.engine, "moments", "clr_merge");
+    b.give_planes(a.give_planes(launch)).arg(a.add_rows).arg(b.add_rows).arg(a.add_rows.size() / sizeof(std::uint64_t));
+    a.last = launch.after(wait_list).after(std::array{a.last.get(), b.last.get()}).run_ranges(a.values);
+    other.state_->last = a.last;
+    a.batches += b.batches;
+    a.weight = device::clr_two_add(a.weight, b.weight);
+    return Event(a.last).give();
+}
+
+void Moments::merge(const Moments& other) { wait(Event(merge(other, {}))); }
+
+std::uint64_t Moments::size() const { return state_->values; }
+std::uint64_t Moments::batches() const { return state_->batches; }
+double Moments::weight() const { return static_cast<double>(state_->weight.hi) + static_cast<double>(state_->weight.lo); }
+MomentsOptions Moments::options() const { return state_->options; }
+const Engine& Moments::engine() const { return state_->engine; }
+StatePlanes Moments::planes() const { return state_->planes; }
+std::uint64_t Moments::negatives() const { return tally(*state_, CLR_TALLY_NEGATIVE); }
+std::uint64_t Moments::skipped() const { return tally(*state_, CLR_TALLY_SKIPPED); }
+
+std::vector<std::uint32_t> Moments::bits(cl_mem StatePlanes::*plane) const {
+    const auto& s = *state_;
+    const cl_mem mem = s.planes.*plane;
+    if (!mem) return {};
+    wait(s.last);
+    const std::size_t parts = plane == &StatePlanes::batches ? 1 : 2;
+    std::vector<std::uint32_t> out(parts * s.values);
+    for (std::size_t p = 0; p < parts; ++p)
+        check(clEnqueueReadBuffer(s.engine.queue(), mem, CL_TRUE, p * plane_stride(s.values) * sizeof(float),
+                                  s.values * sizeof(float), out.data() + p * s.values, 0, nullptr, nullptr),
+              "clEnqueueReadBuffer");
+    return out;
+}
+
+}  // namespace clratio

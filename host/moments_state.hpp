@@ -1,0 +1,51 @@
+// What a Moments holds, and how its kernels see it. Private to the library.
+#pragma once
+
+#include <array>
+
+#include "clratio/combine.hpp"
+#include "clratio/device/planes.h"
+#include "clratio/moments.hpp"
+#include "launch.hpp"
+
+namespace clratio {
+
+struct Moments::State {
+    State(const Engine& e, std::uint64_t count, MomentsOptions o) : engine(e), values(count), options(o) {}
+
+    Engine engine;
+    std::uint64_t values;
+    MomentsOptions options;
+    std::uint64_t batches = 0;
+    device::clr_two weight{0, 0};
+    std::vector<Memory> owned;
+    StatePlanes planes;
+    Buffer add_rows;
+    Event last;  ///< the last launch that touched the planes
+
+    device::clr_state header() const;
+    Launch& give_planes(Launch& launch) const;  ///< the CLR_PLANE_ARGUMENTS
+};
+
+/// A read-out as the kernels take it: the CLR_READING_ARGUMENTS.
+struct Reading {
+    View tau;
+    CombineOutput out;
+    CombineOptions options;
+    cl_mem flag_rows = nullptr;
+
+    void check(std::uint64_t count) const;
+    Launch& give(Launch& launch) const;
+};
+
+/// Weights, sizes and the nonfinite policy of batches that come as views.
+void check_batches(const Moments::State& state, std::span<const Batch> batches);
+
+/// Adds 1 to 8 batches in one launch, and reads out in the same pass where asked.
+Event add_batches(Moments::State& state, std::span<const Batch> batches, const Reading* reading,
+                  std::span<const cl_event> waits);
+
+/// Names a plane that the estimator needs and the state lacks.
+void check_estimator(const CombineOptions& options, const MomentsOptions& state);
+
+}  // namespace clratio

@@ -1,0 +1,82 @@
+// Weighted means and second moments of (m, t), batch by batch, all in two-float (Welford and Chan in difference form).
+#ifndef CLRATIO_DEVICE_MOMENTS_H
+#define CLRATIO_DEVICE_MOMENTS_H
+
+#include "clratio/device/twofloat.h"
+
+CLR_NAMESPACE_BEGIN
+
+typedef struct {
+    clr_two m, t;        // means
+    clr_two mm, tt, mt;  // sums of w (m - mean)^2, w (t - mean)^2, w (m - mean)(t - mean)
+} clr_moments;
+
+// Finished ratios, for estimators that average them: means over all batches of m/t where t != 0, of m where t == 0,
+// and the share of the weight where t == 0.
+typedef struct {
+    clr_two quotient, zero_m, zero_share;
+} clr_ratios;
+
+// How a batch of weight w enters a state of weight W.
+typedef struct {
+    clr_two share;   // w / (W + w)
+    clr_two spread;  // W w / (W + w)
+} clr_entry;
+
+CLR_FN clr_entry clr_entry_make(clr_two weight, clr_two added, clr_two sum) {
+    clr_entry e;
+    const clr_mask none = sum.hi == (clr_real)(0.0f);
+    const clr_two divisor = clr_two_make(none ? (clr_real)(1.0f) : sum.hi, sum.lo);
+    e.share = clr_two_divide(added, divisor);
+    e.spread = clr_two_multiply(weight, e.share);
+    return e;
+}
+
+CLR_FN clr_two clr_two_advance(clr_two mean, clr_two distance, clr_two share) {
+    return clr_two_add(mean, clr_two_multiply(distance, share));
+}
+
+// Adds the second moments that two parts gain by standing dm, dt apart.
+CLR_FN clr_moments clr_moments_move(clr_moments s, clr_two dm, clr_two dt, clr_entry e) {
+    const clr_two um = clr_two_multiply(dm, e.spread);
+    const clr_two ut = clr_two_multiply(dt, e.spread);
+    s.mm = clr_two_add(s.mm, clr_two_multiply(um, dm));
+    s.tt = clr_two_add(s.tt, clr_two_multiply(ut, dt));
+    s.mt = clr_two_add(s.mt, clr_two_multiply(um, dt));
+    s.m = clr_two_advance(s.m, dm, e.share);
+    s.t = clr_two_advance(s.t, dt, e.share);
+    return s;
+}
+
+CLR_FN clr_moments clr_moments_add(clr_moments s, clr_real m, clr_real t, clr_entry e) {
+    return clr_moments_move(s, clr_two_subtract_from(m, s.m), clr_two_subtract_from(t, s.t), e);
+}
+
+CLR_FN clr_moments clr_moments_merge(clr_moments a, clr_moments b, clr_entry e) {
+    a.mm = clr_two_add(a.mm, b.mm);
+    a.tt = clr_two_add(a.tt, b.tt);
+    a.mt = clr_two_add(a.mt, b.mt);
+    return clr_moments_move(a, clr_two_add(b.m, clr_two_negate(a.m)), clr_two_add(b.t, clr_two_negate(a.t)), e);
+}
+
+CLR_FN clr_ratios clr_ratios_merge(clr_ratios a, clr_ratios b, clr_entry e) {
+    a.quotient = clr_two_advance(a.quotient, clr_two_add(b.quotient, clr_two_negate(a.quotient)), e.share);
+    a.zero_m = clr_two_advance(a.zero_m, clr_two_add(b.zero_m, clr_two_negate(a.zero_m)), e.share);
+    a.zero_share = clr_two_advance(a.zero_share, clr_two_add(b.zero_share, clr_two_negate(a.zero_share)), e.share);
+    return a;
+}
+
+CLR_FN clr_ratios clr_ratios_add(clr_ratios s, clr_real m, clr_real t, clr_entry e) {
+    const clr_real zero = (clr_real)(0.0f), one = (clr_real)(1.0f);
+    const clr_mask empty = t == zero;
+    const clr_two quotient = clr_two_divide(clr_two_make(m, zero), clr_two_make(empty ? one : t, zero));
+    clr_ratios b;
+    b.quotient = clr_two_make(empty ? zero : quotient.hi, empty ? zero : quotient.lo);
+    b.zero_m = clr_two_make(empty ? m : zero, zero);
+    b.zero_share = clr_two_make(empty ? one : zero, zero);
+    return clr_ratios_merge(s, b, e);
+}
+
+CLR_NAMESPACE_END
+
+#endif

@@ -1,0 +1,29 @@
+// Every way a kernel can be cut: all widths, both paths, several work sizes.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "clratio/engine.hpp"
+
+namespace clratio::test {
+
+struct Shape {
+    std::string name;
+    EngineOptions options;
+};
+
+inline std::vector<Shape> all_shapes() {
+    using Path = EngineOptions::Path;
+    std::vector<Shape> shapes;
+    for (const int width : {1, 2, 4, 8, 16}) {
+        shapes.push_back({"ranges, width " + std::to_string(width), {.width = width, .path = Path::ranges}});
+        shapes.push_back({"groups, width " + std::to_string(width), {.width = width, .path = Path::groups}});
+    }
+    shapes.push_back({"one work-item", {.path = Path::ranges, .work_items = 1}});
+    shapes.push_back({"7 work-items", {.path = Path::ranges, .work_items = 7}});
+    shapes.push_back({"groups of 3", {.path = Path::groups, .work_items = 3}});
+    return shapes;
+}
+
+}  // namespace clratio::test
