@@ -20,9 +20,13 @@ clr_two two_float(double x) {
 
 device::clr_batch describe(const Batch& b, clr_two weight_before) {
     const clr_two added = two_float(b.weight);
-    const auto entry = device::clr_entry_make(weight_before, added, device::clr_two_add(weight_before, added));
-    return {layout(b.m), layout(b.t), added.hi, added.lo, entry.share.hi, entry.share.lo, entry.spread.hi, entry.spread.lo};
+    const clr_two sum = device::clr_two_add(weight_before, added);
+    const auto entry = device::clr_entry_make(weight_before, added, sum);
+    return {layout(b.m),     layout(b.t),     added.hi,        added.lo, entry.share.hi,
+            entry.share.lo,  entry.spread.hi, entry.spread.lo, sum.hi,   sum.lo};
 }
+
+bool packed(const View& v) { return v.stride == v.channels; }
 
 void check_weight(double weight) {
     if (!(weight > 0) || weight > 1e30)
@@ -101,6 +105,7 @@ Event add_batches(Moments::State& s, std::span<const Batch> batches, const Readi
     check_room(s.batches, batches.size());
     device::clr_batches table{};
     table.count = static_cast<std::uint32_t>(batches.size());
+    table.packed = std::all_of(batches.begin(), batches.end(), [](const Batch& b) { return packed(b.m) && packed(b.t); });
     clr_two weight = s.weight;
     Launch launch(s.engine, "moments", "clr_add");
     for (std::size_t k = 0; k < CLR_BATCHES_PER_LAUNCH; ++k) {
@@ -108,7 +113,7 @@ Event add_batches(Moments::State& s, std::span<const Batch> batches, const Readi
         launch.arg(b.m.mem).arg(b.t.mem);
         if (k >= batches.size()) continue;
         table.of[k] = describe(b, weight);
-        weight = device::clr_two_add(weight, two_float(b.weight));
+        weight = {table.of[k].sum_hi, table.of[k].sum_lo};
     }
     s.give_planes(launch.arg(table)).arg(s.add_rows);
     (reading ? *reading : Reading{}).give(launch);

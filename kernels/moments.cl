@@ -8,66 +8,131 @@
 
 static inline clr_uint clr_one_where(clr_mask m) { return m ? (clr_uint)(1u) : (clr_uint)(0u); }
 
-static inline clr_two clr_spread_lanes(float hi, float lo) { return clr_two_make((clr_real)(hi), (clr_real)(lo)); }
+static inline clr_two clr_both(float hi, float lo) { return clr_two_make((clr_real)(hi), (clr_real)(lo)); }
 
-static inline clr_record clr_add_good(clr_record r, clr_real m, clr_real t, const clr_batch* batch, clr_state s) {
-    clr_entry e;
-    e.share = clr_spread_lanes(batch->share_hi, batch->share_lo);
-    e.spread = clr_spread_lanes(batch->spread_hi, batch->spread_lo);
-    r.moments = clr_moments_add(r.moments, m, t, e);
-    if (s.options & CLR_STATE_RATIOS) r.ratios = clr_ratios_add(r.ratios, m, t, e);
-    r.weight = clr_two_add(r.weight, clr_spread_lanes(batch->weight_hi, batch->weight_lo));
-    r.batches += (clr_uint)(1u);
-    return r;
+// The inputs of one launch.
+typedef struct {
+    global const float *m[CLR_BATCHES_PER_LAUNCH], *t[CLR_BATCHES_PER_LAUNCH];
+} clr_inputs;
+
+// A block of vectors stays in the first cache while the batches go over it one by one: neighbours do not wait for each other, and
+// few streams run through memory at a time. GPUs keep one vector in registers.
+#if CLR_GROUPED
+#define CLR_BLOCK 1
+#else
+#define CLR_BLOCK 32
+#endif
+
+typedef struct {
+    clr_moments moments[CLR_BLOCK];
+    clr_real doubt[CLR_BLOCK];  // not 0 in lanes that lost a batch, or met a NaN or an infinity
+} clr_block;
+
+static inline clr_real clr_lost_before(clr_planes planes, clr_state s, ulong i) {
+    if (!(s.options & CLR_STATE_PER_VALUE)) return (clr_real)(0.0f);
+    return clr_bits(clr_load(planes.batches + i)) == (clr_uint)(s.batches) ? (clr_real)(0.0f) : (clr_real)(1.0f);
 }
 
-static inline clr_record clr_add_where(clr_record r, clr_mask good, clr_real m, clr_real t, const clr_batch* batch, clr_state s) {
+// Batch k over a block of whole vectors of contiguous values. The first pass takes the state from the planes, the last one puts
+// it back, save for vectors in doubt: those it returns, a bit each, untouched.
+static inline uint clr_pass(const bool is_first, const bool is_last, uint k, const clr_inputs* in, const clr_batches* batches,
+                            clr_block* block, clr_planes planes, clr_state s, ulong first, clr_uint* negative) {
     const clr_real zero = (clr_real)(0.0f);
-    const clr_two weight = clr_spread_lanes(batch->weight_hi, batch->weight_lo);
-    const clr_two added = clr_two_make(good ? weight.hi : zero, good ? weight.lo : zero);
-    const clr_two sum = clr_two_add(r.weight, added);
-    const clr_entry e = clr_entry_make(r.weight, added, sum);
-    m = good ? m : zero;
-    t = good ? t : zero;
-    r.moments = clr_moments_add(r.moments, m, t, e);
-    if (s.options & CLR_STATE_RATIOS) r.ratios = clr_ratios_add(r.ratios, m, t, e);
-    r.weight = sum;
-    r.batches += clr_one_where(good);
-    return r;
+    const clr_batch batch = batches->of[k];
+    global const float* m_from = in->m[k] + batch.m.offset + first;
+    global const float* t_from = in->t[k] + batch.t.offset + first;
+    const clr_two sum = clr_both(batch.sum_hi, batch.sum_lo);
+    const bool skips = s.options & CLR_STATE_PER_VALUE;
+    clr_entry e;
+    e.share = clr_both(batch.share_hi, batch.share_lo);
+    e.spread = clr_both(batch.spread_hi, batch.spread_lo);
+    clr_uint below = *negative;
+    uint doubtful = 0;
+    for (uint v = 0; v < CLR_BLOCK; ++v) {
+        const ulong at = first + v * CLR_WIDTH;
+        const clr_real m = clr_load(m_from + v * CLR_WIDTH), t = clr_load(t_from + v * CLR_WIDTH);
+        const clr_real before = is_first ? clr_lost_before(planes, s, at) : block->doubt[v];
+        const clr_real doubt = clr_fma(m, zero, clr_fma(t, zero, before));
+        below += clr_one_where(m < zero) + clr_one_where(t < zero);
+        const clr_moments moments =
+            clr_moments_add(is_first ? clr_load_moments(planes, s.stride, at) : block->moments[v], m, t, e);
+        if (!is_last) {
+            block->moments[v] = moments;
+            block->doubt[v] = doubt;
+        } else if (skips && clr_any(doubt != zero)) {
+            doubtful |= 1u << v;
+        } else {
+            clr_store_moments(moments, planes, s.stride, at);
+            if (skips) clr_store_evidence(sum, (clr_uint)(s.batches + batches->count), planes, s.stride, at);
+        }
+    }
+    *negative = below;
+    return doubtful;
+}
+
+static inline uint clr_add_block(const clr_inputs* in, const clr_batches* batches, clr_planes planes, clr_state s, ulong first,
+                                 clr_uint* negative) {
+    clr_block block;
+    const uint last = batches->count - 1;
+    if (last == 0) return clr_pass(true, true, 0, in, batches, &block, planes, s, first, negative);
+    clr_pass(true, false, 0, in, batches, &block, planes, s, first, negative);
+    for (uint k = 1; k < last; ++k) clr_pass(false, false, k, in, batches, &block, planes, s, first, negative);
+    return clr_pass(false, true, last, in, batches, &block, planes, s, first, negative);
+}
+
+// Any vector: each value has a share of its own in each batch.
+static inline void clr_add_vector(const clr_inputs* in, const clr_batches* batches, clr_planes planes, clr_state s, ulong first,
+                                  ulong count, clr_uint* negative, clr_uint* skipped) {
+    const clr_real zero = (clr_real)(0.0f);
+    const bool skips = s.options & CLR_STATE_PER_VALUE;
+    clr_record r = clr_load_record(planes, s, first);
+    for (uint k = 0; k < batches->count; ++k) {
+        const clr_batch batch = batches->of[k];
+        const clr_real m = clr_load_view(in->m[k], batch.m, first, count);
+        const clr_real t = clr_load_view(in->t[k], batch.t, first, count);
+        const clr_mask bad = skips ? !(clr_is_finite(m) && clr_is_finite(t)) : zero != zero;
+        const clr_two added = clr_two_make(bad ? zero : (clr_real)(batch.weight_hi), bad ? zero : (clr_real)(batch.weight_lo));
+        const clr_two sum = clr_two_add(r.weight, added);
+        const clr_entry e = clr_entry_make(r.weight, added, sum);
+        r.moments = clr_moments_add(r.moments, bad ? zero : m, bad ? zero : t, e);
+        if (s.options & CLR_STATE_RATIOS) r.ratios = clr_ratios_add(r.ratios, bad ? zero : m, bad ? zero : t, e);
+        r.weight = sum;
+        r.batches += clr_one_where(!bad);
+        *negative += clr_one_where(m < zero) + clr_one_where(t < zero);
+        *skipped += clr_one_where(bad);
+    }
+    clr_store_record(r, planes, s, first);
 }
 
 kernel void clr_add(CLR_EACH_BATCH(CLR_BATCH_ARGUMENTS) clr_batches batches, CLR_PLANE_ARGUMENTS(s), global ulong* add_rows,
                     CLR_READING_ARGUMENTS, clr_range range) {
-    global const float* const m_of[CLR_BATCHES_PER_LAUNCH] = {CLR_EACH_BATCH(CLR_M)};
-    global const float* const t_of[CLR_BATCHES_PER_LAUNCH] = {CLR_EACH_BATCH(CLR_T)};
+    const clr_inputs in = {{CLR_EACH_BATCH(CLR_M)}, {CLR_EACH_BATCH(CLR_T)}};
     const clr_planes planes = CLR_PLANES(s);
-    const clr_real zero = (clr_real)(0.0f);
+    const bool plain = batches.packed && !(s_state.options & CLR_STATE_RATIOS);
+    clr_state after = s_state;
+    after.batches += batches.count;
+    after.weight_hi = batches.of[batches.count - 1].sum_hi;
+    after.weight_lo = batches.of[batches.count - 1].sum_lo;
     clr_uint negative = (clr_uint)(0u), skipped = (clr_uint)(0u);
     clr_flag_tally tally = {{(clr_uint)(0u)}};
 
     const clr_span span = clr_my_span(range);
-    for (ulong v = span.begin; v < span.end; v += span.step) {
+    for (ulong v = span.begin; v < span.end;) {
         const ulong first = v * CLR_WIDTH;
-        clr_record r = clr_load_record(planes, s_state, first);
-        for (uint k = 0; k < batches.count; ++k) {
-            const clr_batch batch = batches.of[k];
-            const clr_real m = clr_load_view(m_of[k], batch.m, first, range.count);
-            const clr_real t = clr_load_view(t_of[k], batch.t, first, range.count);
-            negative += clr_one_where(m < zero) + clr_one_where(t < zero);
-            if (s_state.options & CLR_STATE_PER_VALUE) {
-                const clr_mask good = clr_is_finite(m) && clr_is_finite(t);
-                skipped += clr_one_where(!good);
-                r = clr_add_where(r, good, m, t, &batch, s_state);
-            } else {
-                r = clr_add_good(r, m, t, &batch, s_state);
+        const bool whole = plain && v + CLR_BLOCK <= span.end && first + CLR_BLOCK * CLR_WIDTH <= range.count;
+        const ulong done = whole ? CLR_BLOCK : 1;
+        clr_uint counted = (clr_uint)(0u);
+        uint left = whole ? clr_add_block(&in, &batches, planes, s_state, first, &negative) : 1u;
+        for (ulong at = first; left; left >>= 1, at += CLR_WIDTH)
+            if (left & 1u) clr_add_vector(&in, &batches, planes, s_state, at, range.count, whole ? &counted : &negative, &skipped);
+        if (reading.outputs)
+            for (ulong k = 0; k < done; ++k) {
+                const ulong at = first + k * CLR_WIDTH;
+                const clr_real control = clr_load_view(tau, reading.tau, at, range.count);
+                const clr_estimate e = clr_read_record(clr_load_record(planes, after, at), after.batches, control, reading);
+                clr_write_reading(e, reading, estimate, error, flags, &tally, at, range.count);
             }
-        }
-        clr_store_record(r, planes, s_state, first);
-        if (reading.outputs) {
-            const clr_real control = clr_load_view(tau, reading.tau, first, range.count);
-            const clr_estimate e = clr_read_record(r, s_state.batches + batches.count, control, reading);
-            clr_write_reading(e, reading, estimate, error, flags, &tally, first, range.count);
-        }
+        v += done * span.step;
     }
     add_rows[get_global_id(0) * CLR_TALLY_ADD + CLR_TALLY_NEGATIVE] += clr_sum_lanes(negative);
     add_rows[get_global_id(0) * CLR_TALLY_ADD + CLR_TALLY_SKIPPED] += clr_sum_lanes(skipped);

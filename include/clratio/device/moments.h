@@ -49,20 +49,20 @@ CLR_FN clr_moments clr_moments_move(clr_moments s, clr_two dm, clr_two dt, clr_e
 }
 
 CLR_FN clr_moments clr_moments_add(clr_moments s, clr_real m, clr_real t, clr_entry e) {
-    return clr_moments_move(s, clr_two_subtract_from(m, s.m), clr_two_subtract_from(t, s.t), e);
+    return clr_moments_move(s, clr_two_distance(m, s.m), clr_two_distance(t, s.t), e);
 }
 
 CLR_FN clr_moments clr_moments_merge(clr_moments a, clr_moments b, clr_entry e) {
     a.mm = clr_two_add(a.mm, b.mm);
     a.tt = clr_two_add(a.tt, b.tt);
     a.mt = clr_two_add(a.mt, b.mt);
-    return clr_moments_move(a, clr_two_add(b.m, clr_two_negate(a.m)), clr_two_add(b.t, clr_two_negate(a.t)), e);
+    return clr_moments_move(a, clr_two_subtract(b.m, a.m), clr_two_subtract(b.t, a.t), e);
 }
 
 CLR_FN clr_ratios clr_ratios_merge(clr_ratios a, clr_ratios b, clr_entry e) {
-    a.quotient = clr_two_advance(a.quotient, clr_two_add(b.quotient, clr_two_negate(a.quotient)), e.share);
-    a.zero_m = clr_two_advance(a.zero_m, clr_two_add(b.zero_m, clr_two_negate(a.zero_m)), e.share);
-    a.zero_share = clr_two_advance(a.zero_share, clr_two_add(b.zero_share, clr_two_negate(a.zero_share)), e.share);
+    a.quotient = clr_two_advance(a.quotient, clr_two_subtract(b.quotient, a.quotient), e.share);
+    a.zero_m = clr_two_advance(a.zero_m, clr_two_subtract(b.zero_m, a.zero_m), e.share);
+    a.zero_share = clr_two_advance(a.zero_share, clr_two_subtract(b.zero_share, a.zero_share), e.share);
     return a;
 }
 

@@ -9,15 +9,15 @@ CLR_NAMESPACE_BEGIN
 
 #define CLR_BATCHES_PER_LAUNCH 8
 
-// One batch of a launch; share and spread are clr_entry for a state whose weight is the same for every value.
+// One batch of a launch. share and spread are the clr_entry, and sum the weight after it, of a value that skipped nothing.
 typedef struct {
     clr_layout m, t;
-    float weight_hi, weight_lo, share_hi, share_lo, spread_hi, spread_lo;
+    float weight_hi, weight_lo, share_hi, share_lo, spread_hi, spread_lo, sum_hi, sum_lo;
 } clr_batch;
 
 typedef struct {
     clr_batch of[CLR_BATCHES_PER_LAUNCH];
-    clr_u32 count, unused;
+    clr_u32 count, packed;  // packed: every view is contiguous
 } clr_batches;
 
 #define CLR_STATE_PER_VALUE 1u  // weight and batch count are planes
@@ -77,13 +77,32 @@ static inline void clr_store_two(clr_two v, global float* p, ulong i, ulong stri
 
 static inline clr_two clr_two_zero(void) { return clr_two_make((clr_real)(0.0f), (clr_real)(0.0f)); }
 
+static inline clr_moments clr_load_moments(clr_planes p, ulong stride, ulong i) {
+    clr_moments s;
+    s.m = clr_load_two(p.m, i, stride);
+    s.t = clr_load_two(p.t, i, stride);
+    s.mm = clr_load_two(p.mm, i, stride);
+    s.tt = clr_load_two(p.tt, i, stride);
+    s.mt = clr_load_two(p.mt, i, stride);
+    return s;
+}
+
+static inline void clr_store_moments(clr_moments s, clr_planes p, ulong stride, ulong i) {
+    clr_store_two(s.m, p.m, i, stride);
+    clr_store_two(s.t, p.t, i, stride);
+    clr_store_two(s.mm, p.mm, i, stride);
+    clr_store_two(s.tt, p.tt, i, stride);
+    clr_store_two(s.mt, p.mt, i, stride);
+}
+
+static inline void clr_store_evidence(clr_two weight, clr_uint batches, clr_planes p, ulong stride, ulong i) {
+    clr_store_two(weight, p.weight, i, stride);
+    clr_store(clr_from_bits(batches), p.batches + i);
+}
+
 static inline clr_record clr_load_record(clr_planes p, clr_state s, ulong i) {
     clr_record r;
-    r.moments.m = clr_load_two(p.m, i, s.stride);
-    r.moments.t = clr_load_two(p.t, i, s.stride);
-    r.moments.mm = clr_load_two(p.mm, i, s.stride);
-    r.moments.tt = clr_load_two(p.tt, i, s.stride);
-    r.moments.mt = clr_load_two(p.mt, i, s.stride);
+    r.moments = clr_load_moments(p, s.stride, i);
     if (s.options & CLR_STATE_PER_VALUE) {
         r.weight = clr_load_two(p.weight, i, s.stride);
         r.batches = clr_bits(clr_load(p.batches + i));
@@ -101,15 +120,8 @@ static inline clr_record clr_load_record(clr_planes p, clr_state s, ulong i) {
 }
 
 static inline void clr_store_record(clr_record r, clr_planes p, clr_state s, ulong i) {
-    clr_store_two(r.moments.m, p.m, i, s.stride);
-    clr_store_two(r.moments.t, p.t, i, s.stride);
-    clr_store_two(r.moments.mm, p.mm, i, s.stride);
-    clr_store_two(r.moments.tt, p.tt, i, s.stride);
-    clr_store_two(r.moments.mt, p.mt, i, s.stride);
-    if (s.options & CLR_STATE_PER_VALUE) {
-        clr_store_two(r.weight, p.weight, i, s.stride);
-        clr_store(clr_from_bits(r.batches), p.batches + i);
-    }
+    clr_store_moments(r.moments, p, s.stride, i);
+    if (s.options & CLR_STATE_PER_VALUE) clr_store_evidence(r.weight, r.batches, p, s.stride, i);
     if (s.options & CLR_STATE_RATIOS) {
         clr_store_two(r.ratios.quotient, p.quotient, i, s.stride);
         clr_store_two(r.ratios.zero_m, p.zero_m, i, s.stride);

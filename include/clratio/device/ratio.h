@@ -56,8 +56,8 @@ CLR_FN clr_real clr_error_of_mean(clr_real sum, clr_evidence n) {
 // M2 of the residual m - r t.
 CLR_FN clr_real clr_residual(clr_moments s, clr_two r) {
     const clr_two twice = clr_two_make(s.mt.hi + s.mt.hi, s.mt.lo + s.mt.lo);
-    const clr_two inner = clr_two_add(twice, clr_two_negate(clr_two_multiply(r, s.tt)));
-    const clr_two sum = clr_two_add(s.mm, clr_two_negate(clr_two_multiply(r, inner)));
+    const clr_two inner = clr_two_subtract(twice, clr_two_multiply(r, s.tt));
+    const clr_two sum = clr_two_subtract(s.mm, clr_two_multiply(r, inner));
     return sum.hi;
 }
 

@@ -32,30 +32,41 @@ CLR_FN clr_two clr_two_sum(clr_real a, clr_real b) {
     return clr_two_make(s, (a - (s - v)) + (b - v));
 }
 
+// a - b exactly.
+CLR_FN clr_two clr_two_difference(clr_real a, clr_real b) {
+    const clr_real s = a - b;
+    const clr_real v = s - a;
+    return clr_two_make(s, (a - (s - v)) - (b + v));
+}
+
 // a * b exactly.
 CLR_FN clr_two clr_two_product(clr_real a, clr_real b) {
     const clr_real p = a * b;
     return clr_two_make(p, clr_fma(a, b, -p));
 }
 
-// x + y, relative error below 2^-46 of |x| + |y|.
+// x + y, rounding error below 2^-46 (|x| + |y|).
 CLR_FN clr_two clr_two_add(clr_two x, clr_two y) {
     const clr_two s = clr_two_sum(x.hi, y.hi);
     return clr_two_quick_sum(s.hi, s.lo + (x.lo + y.lo));
 }
 
-CLR_FN clr_two clr_two_negate(clr_two x) { return clr_two_make(-x.hi, -x.lo); }
-
-// a - y, for a plain a.
-CLR_FN clr_two clr_two_subtract_from(clr_real a, clr_two y) {
-    const clr_two s = clr_two_sum(a, -y.hi);
-    return clr_two_quick_sum(s.hi, s.lo - y.lo);
+// x - y, likewise.
+CLR_FN clr_two clr_two_subtract(clr_two x, clr_two y) {
+    const clr_two s = clr_two_difference(x.hi, y.hi);
+    return clr_two_quick_sum(s.hi, s.lo + (x.lo - y.lo));
 }
 
-// x * y, relative error below 2^-44.
+// a - y for a plain a, as a loose pair: hi need not be the nearest float of the sum. Rounding error below 2^-47 |y|.
+CLR_FN clr_two clr_two_distance(clr_real a, clr_two y) {
+    const clr_two s = clr_two_difference(a, y.hi);
+    return clr_two_make(s.hi, s.lo - y.lo);
+}
+
+// x * y as a loose pair, rounding error below 2^-45 |x y| for pairs that are not loose.
 CLR_FN clr_two clr_two_multiply(clr_two x, clr_two y) {
     const clr_two p = clr_two_product(x.hi, y.hi);
-    return clr_two_quick_sum(p.hi, clr_fma(x.hi, y.lo, clr_fma(x.lo, y.hi, p.lo)));
+    return clr_two_make(p.hi, clr_fma(x.hi, y.lo, clr_fma(x.lo, y.hi, p.lo)));
 }
 
 // x / y, relative error below 2^-43; y.hi != 0.

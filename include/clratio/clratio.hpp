@@ -1,0 +1,8 @@
+// All of clratio::clratio; images are in clratio/image.hpp (clratio::io).
+#pragma once
+
+#include "clratio/combine.hpp"
+#include "clratio/engine.hpp"
+#include "clratio/exception.hpp"
+#include "clratio/moments.hpp"
+#include "clratio/view.hpp"
