@@ -18,12 +18,11 @@ clr_two two_float(double x) {
     return {hi, static_cast<float>(x - static_cast<double>(hi))};
 }
 
-device::clr_batch describe(const Batch& b, clr_two weight_before) {
-    const clr_two added = two_float(b.weight);
+device::clr_batch describe(const View& m, const View& t, clr_two weight_before, clr_two added) {
     const clr_two sum = device::clr_two_add(weight_before, added);
     const auto entry = device::clr_entry_make(weight_before, added, sum);
-    return {layout(b.m),     layout(b.t),     added.hi,        added.lo, entry.share.hi,
-            entry.share.lo,  entry.spread.hi, entry.spread.lo, sum.hi,   sum.lo};
+    return {layout(m),      layout(t),       added.hi,        added.lo, entry.share.hi,
+            entry.share.lo, entry.spread.hi, entry.spread.lo, sum.hi,   sum.lo};
 }
 
 bool packed(const View& v) { return v.stride == v.channels; }
@@ -112,7 +111,7 @@ Event add_batches(Moments::State& s, std::span<const Batch> batches, const Readi
         const Batch& b = batches[std::min(k, batches.size() - 1)];
         launch.arg(b.m.mem).arg(b.t.mem);
         if (k >= batches.size()) continue;
-        table.of[k] = describe(b, weight);
+        table.of[k] = describe(b.m, b.t, weight, two_float(b.weight));
         weight = {table.of[k].sum_hi, table.of[k].sum_lo};
     }
     s.give_planes(launch.arg(table)).arg(s.add_rows);
@@ -212,11 +211,16 @@ cl_event Moments::merge(const Moments& other, std::span<const cl_event> wait_lis
         throw InvalidArgument("merge", "a state with the same options", "others");
     check_room(a.batches, b.batches);
     Launch launch(a.engine, "moments", "clr_merge");
-    b.give_planes(a.give_planes(launch)).arg(a.add_rows).arg(b.add_rows).arg(a.add_rows.size() / sizeof(std::uint64_t));
+    const auto entry = describe({}, {}, a.weight, b.weight);
+    b.give_planes(a.give_planes(launch))
+        .arg(entry)
+        .arg(a.add_rows)
+        .arg(b.add_rows)
+        .arg(a.add_rows.size() / sizeof(std::uint64_t));
     a.last = launch.after(wait_list).after(std::array{a.last.get(), b.last.get()}).run_ranges(a.values);
     other.state_->last = a.last;
     a.batches += b.batches;
-    a.weight = device::clr_two_add(a.weight, b.weight);
+    a.weight = {entry.sum_hi, entry.sum_lo};
     return Event(a.last).give();
 }
 

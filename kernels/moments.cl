@@ -10,6 +10,15 @@ static inline clr_uint clr_one_where(clr_mask m) { return m ? (clr_uint)(1u) : (
 
 static inline clr_two clr_both(float hi, float lo) { return clr_two_make((clr_real)(hi), (clr_real)(lo)); }
 
+static inline clr_entry clr_entry_of(const clr_batch* batch) {
+    clr_entry e;
+    e.share = clr_both(batch->share_hi, batch->share_lo);
+    e.spread = clr_both(batch->spread_hi, batch->spread_lo);
+    return e;
+}
+
+static inline clr_uint clr_batches_of(clr_planes planes, ulong i) { return clr_bits(clr_load(planes.batches + i)); }
+
 // The inputs of one launch.
 typedef struct {
     global const float *m[CLR_BATCHES_PER_LAUNCH], *t[CLR_BATCHES_PER_LAUNCH];
@@ -30,7 +39,7 @@ typedef struct {
 
 static inline clr_real clr_lost_before(clr_planes planes, clr_state s, ulong i) {
     if (!(s.options & CLR_STATE_PER_VALUE)) return (clr_real)(0.0f);
-    return clr_bits(clr_load(planes.batches + i)) == (clr_uint)(s.batches) ? (clr_real)(0.0f) : (clr_real)(1.0f);
+    return clr_batches_of(planes, i) == (clr_uint)(s.batches) ? (clr_real)(0.0f) : (clr_real)(1.0f);
 }
 
 // Batch k over a block of whole vectors of contiguous values. The first pass takes the state from the planes, the last one puts
@@ -43,9 +52,7 @@ static inline uint clr_pass(const bool is_first, const bool is_last, uint k, con
     global const float* t_from = in->t[k] + batch.t.offset + first;
     const clr_two sum = clr_both(batch.sum_hi, batch.sum_lo);
     const bool skips = s.options & CLR_STATE_PER_VALUE;
-    clr_entry e;
-    e.share = clr_both(batch.share_hi, batch.share_lo);
-    e.spread = clr_both(batch.spread_hi, batch.spread_lo);
+    const clr_entry e = clr_entry_of(&batch);
     clr_uint below = *negative;
     uint doubtful = 0;
     for (uint v = 0; v < CLR_BLOCK; ++v) {
@@ -139,22 +146,36 @@ kernel void clr_add(CLR_EACH_BATCH(CLR_BATCH_ARGUMENTS) clr_batches batches, CLR
     if (reading.outputs) clr_store_flag_tally(&tally, flag_rows);
 }
 
-kernel void clr_merge(CLR_PLANE_ARGUMENTS(a), CLR_PLANE_ARGUMENTS(b), global ulong* a_rows, global const ulong* b_rows,
-                      ulong row_words, clr_range range) {
+// entry: how b enters a for values that skipped nothing on either side.
+kernel void clr_merge(CLR_PLANE_ARGUMENTS(a), CLR_PLANE_ARGUMENTS(b), clr_batch entry, global ulong* a_rows,
+                      global const ulong* b_rows, ulong row_words, clr_range range) {
     for (ulong i = get_global_id(0); i < row_words; i += get_global_size(0)) a_rows[i] += b_rows[i];
     const clr_planes to = CLR_PLANES(a), from = CLR_PLANES(b);
+    const clr_real zero = (clr_real)(0.0f);
+    const bool skips = a_state.options & CLR_STATE_PER_VALUE;
     const clr_span span = clr_my_span(range);
     for (ulong v = span.begin; v < span.end; v += span.step) {
         const ulong first = v * CLR_WIDTH;
-        clr_record r = clr_load_record(to, a_state, first);
-        const clr_record other = clr_load_record(from, b_state, first);
-        const clr_two sum = clr_two_add(r.weight, other.weight);
-        const clr_entry e = clr_entry_make(r.weight, other.weight, sum);
-        r.moments = clr_moments_merge(r.moments, other.moments, e);
-        if (a_state.options & CLR_STATE_RATIOS) r.ratios = clr_ratios_merge(r.ratios, other.ratios, e);
-        r.weight = sum;
-        r.batches += other.batches;
-        clr_store_record(r, to, a_state, first);
+        const clr_moments moments = clr_load_moments(to, a_state.stride, first);
+        const clr_moments other = clr_load_moments(from, b_state.stride, first);
+        clr_entry e = clr_entry_of(&entry);
+        if (skips) {
+            clr_two weight = clr_both(entry.sum_hi, entry.sum_lo);
+            const clr_uint batches = clr_batches_of(to, first), more = clr_batches_of(from, first);
+            if (clr_any(clr_lost_before(to, a_state, first) + clr_lost_before(from, b_state, first) != zero)) {
+                const clr_two before = clr_load_two(to.weight, first, a_state.stride);
+                const clr_two added = clr_load_two(from.weight, first, b_state.stride);
+                weight = clr_two_add(before, added);
+                e = clr_entry_make(before, added, weight);
+            }
+            clr_store_evidence(weight, batches + more, to, a_state.stride, first);
+        }
+        clr_store_moments(clr_moments_merge(moments, other, e), to, a_state.stride, first);
+        if (a_state.options & CLR_STATE_RATIOS) {
+            const clr_ratios sum = clr_ratios_merge(clr_load_ratios(to, a_state.stride, first),
+                                                    clr_load_ratios(from, b_state.stride, first), e);
+            clr_store_ratios(sum, to, a_state.stride, first);
+        }
     }
 }
 

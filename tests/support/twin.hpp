@@ -39,7 +39,7 @@ struct TwinValue {
 
     device::clr_estimate read(float tau, std::uint32_t added, std::uint32_t estimator = CLR_ESTIMATOR_RATIO,
                               std::uint32_t zero = CLR_ZERO_MC_MEAN) const {
-        return device::clr_read_out(moments, ratios, {batches, weight.hi}, added, tau, estimator, zero);
+        return device::clr_read_out(moments, ratios, {batches, weight.hi}, added, tau, estimator, zero, true);
     }
 };
 

@@ -100,6 +100,20 @@ static inline void clr_store_evidence(clr_two weight, clr_uint batches, clr_plan
     clr_store(clr_from_bits(batches), p.batches + i);
 }
 
+static inline clr_ratios clr_load_ratios(clr_planes p, ulong stride, ulong i) {
+    clr_ratios r;
+    r.quotient = clr_load_two(p.quotient, i, stride);
+    r.zero_m = clr_load_two(p.zero_m, i, stride);
+    r.zero_share = clr_load_two(p.zero_share, i, stride);
+    return r;
+}
+
+static inline void clr_store_ratios(clr_ratios r, clr_planes p, ulong stride, ulong i) {
+    clr_store_two(r.quotient, p.quotient, i, stride);
+    clr_store_two(r.zero_m, p.zero_m, i, stride);
+    clr_store_two(r.zero_share, p.zero_share, i, stride);
+}
+
 static inline clr_record clr_load_record(clr_planes p, clr_state s, ulong i) {
     clr_record r;
     r.moments = clr_load_moments(p, s.stride, i);
@@ -111,29 +125,22 @@ static inline clr_record clr_load_record(clr_planes p, clr_state s, ulong i) {
         r.batches = (clr_uint)(s.batches);
     }
     r.ratios.quotient = r.ratios.zero_m = r.ratios.zero_share = clr_two_zero();
-    if (s.options & CLR_STATE_RATIOS) {
-        r.ratios.quotient = clr_load_two(p.quotient, i, s.stride);
-        r.ratios.zero_m = clr_load_two(p.zero_m, i, s.stride);
-        r.ratios.zero_share = clr_load_two(p.zero_share, i, s.stride);
-    }
+    if (s.options & CLR_STATE_RATIOS) r.ratios = clr_load_ratios(p, s.stride, i);
     return r;
 }
 
 static inline void clr_store_record(clr_record r, clr_planes p, clr_state s, ulong i) {
     clr_store_moments(r.moments, p, s.stride, i);
     if (s.options & CLR_STATE_PER_VALUE) clr_store_evidence(r.weight, r.batches, p, s.stride, i);
-    if (s.options & CLR_STATE_RATIOS) {
-        clr_store_two(r.ratios.quotient, p.quotient, i, s.stride);
-        clr_store_two(r.ratios.zero_m, p.zero_m, i, s.stride);
-        clr_store_two(r.ratios.zero_share, p.zero_share, i, s.stride);
-    }
+    if (s.options & CLR_STATE_RATIOS) clr_store_ratios(r.ratios, p, s.stride, i);
 }
 
 static inline clr_estimate clr_read_record(clr_record r, uint added, clr_real tau, clr_reading reading) {
     clr_evidence n;
     n.batches = r.batches;
     n.weight = r.weight.hi;
-    return clr_read_out(r.moments, r.ratios, n, added, tau, reading.estimator, reading.zero_policy);
+    return clr_read_out(r.moments, r.ratios, n, added, tau, reading.estimator, reading.zero_policy,
+                        (reading.outputs & CLR_WRITE_ERROR) != 0);
 }
 
 static inline ulong clr_sum_lanes(clr_uint v) {

@@ -45,12 +45,17 @@ CLR_FN clr_real clr_zero_value(clr_u32 policy, clr_real tau, clr_real m) {
     return policy == CLR_ZERO_ONE ? tau : (clr_real)(0.0f);
 }
 
-// sqrt(sum / ((K - 1) W)), the standard error of a mean of batches whose weights are sample counts; +inf for K < 2.
+// +inf for K < 2, else 0.
+CLR_FN clr_real clr_error_if_few(clr_evidence n) {
+    return n.batches < (clr_uint)(2u) ? (clr_real)(INFINITY) : (clr_real)(0.0f);
+}
+
+// sqrt(sum / ((K - 1) W)), the standard error of a mean of batches whose weights are sample counts, for K > 1.
 CLR_FN clr_real clr_error_of_mean(clr_real sum, clr_evidence n) {
     const clr_mask few = n.batches < (clr_uint)(2u);
     const clr_real freedom = clr_to_real(few ? (clr_uint)(1u) : n.batches - (clr_uint)(1u));
-    const clr_real variance = (sum > (clr_real)(0.0f) ? sum : sum * (clr_real)(0.0f)) / (freedom * n.weight);
-    return few ? (clr_real)(INFINITY) : clr_sqrt(variance);
+    const clr_real weight = few ? (clr_real)(1.0f) : n.weight;
+    return clr_sqrt((sum > (clr_real)(0.0f) ? sum : sum * (clr_real)(0.0f)) / (freedom * weight));
 }
 
 // M2 of the residual m - r t.
@@ -86,13 +91,16 @@ CLR_FN clr_uint clr_quotient_flags(clr_quotient q, clr_real tau) {
     return clr_flag_if(q.empty, CLR_FLAG_ZERO_DENOMINATOR) | clr_flag_if(tau == (clr_real)(0.0f), CLR_FLAG_ZERO_TAU);
 }
 
-CLR_FN clr_estimate clr_ratio_of_means(clr_moments s, clr_evidence n, clr_real tau, clr_u32 zero_policy) {
+CLR_FN clr_estimate clr_ratio_of_means(clr_moments s, clr_evidence n, clr_real tau, clr_u32 zero_policy, bool with_error) {
+    const clr_real infinite = (clr_real)(INFINITY), one = (clr_real)(1.0f);
     const clr_quotient q = clr_divide_means(s.m, s.t, tau, zero_policy);
-    const clr_real slope = clr_abs(q.control / q.denominator);
-    const clr_real stand_in = zero_policy == CLR_ZERO_MC_MEAN ? clr_error_of_mean(s.mm.hi, n) : (clr_real)(INFINITY);
     clr_estimate e;
     e.value = q.value;
-    e.error = q.empty ? stand_in : slope * clr_error_of_mean(clr_residual(s, q.quotient), n);
+    e.error = zero_policy == CLR_ZERO_MC_MEAN ? clr_error_if_few(n) : (q.empty ? infinite : clr_error_if_few(n));
+    if (with_error) {
+        const clr_real slope = q.empty ? one : clr_abs(q.control / q.denominator);
+        e.error += slope * clr_error_of_mean(q.empty ? s.mm.hi : clr_residual(s, q.quotient), n);
+    }
     e.flags = clr_quotient_flags(q, tau);
     return e;
 }
@@ -100,7 +108,7 @@ CLR_FN clr_estimate clr_ratio_of_means(clr_moments s, clr_evidence n, clr_real t
 CLR_FN clr_estimate clr_plain_mean(clr_moments s, clr_evidence n) {
     clr_estimate e;
     e.value = s.m.hi;
-    e.error = clr_error_of_mean(s.mm.hi, n);
+    e.error = clr_error_if_few(n) + clr_error_of_mean(s.mm.hi, n);
     e.flags = (clr_uint)(0u);
     return e;
 }
@@ -131,16 +139,17 @@ CLR_FN clr_estimate clr_read_means(clr_real m, clr_real t, clr_real tau, clr_u32
     return e;
 }
 
-// Any of the estimators, with all flags; `added` is the number of batches that were offered to the state.
+// Any of the estimators, with all flags; `added` is the number of batches that were offered to the state. Without with_error
+// the error is only told to be finite or infinite.
 CLR_FN clr_estimate clr_read_out(clr_moments s, clr_ratios q, clr_evidence n, clr_u32 added, clr_real tau, clr_u32 estimator,
-                                 clr_u32 zero_policy) {
+                                 clr_u32 zero_policy, bool with_error) {
     clr_estimate e;
     if (estimator == CLR_ESTIMATOR_MEAN)
         e = clr_plain_mean(s, n);
     else if (estimator == CLR_ESTIMATOR_MEAN_OF_RATIOS)
         e = clr_mean_of_ratios(s, q, tau, zero_policy);
     else
-        e = clr_ratio_of_means(s, n, tau, zero_policy);
+        e = clr_ratio_of_means(s, n, tau, zero_policy, with_error);
     const clr_mask no_data = n.batches == (clr_uint)(0u);
     e.value = no_data ? (clr_real)(0.0f) : e.value;
     e.flags = (no_data ? (clr_uint)(0u) : e.flags) | clr_flag_if(no_data, CLR_FLAG_NO_DATA) |
