@@ -65,6 +65,7 @@ struct Report {
     clratio::Image shape;  ///< of the first batch, without its values
     std::uint64_t batches = 0, negatives = 0;
     clratio::FlagCounts flags;
+    std::uint64_t flagged = 0;  ///< values with a flag that matters to this run, see matters()
     Seconds seconds;
     std::optional<Scores> scores;
 };
@@ -99,12 +100,17 @@ std::vector<float> tau_numbers(const Options& options) {
     return numbers;
 }
 
-clratio::Image mean_of_files(const Options& options, const clratio::Image& shape, double& decode) {
+clratio::Image read_like(const std::string& file, const Options& options, Report& report) {
+    auto image = timed(report.seconds.decode, [&] { return clratio::read_image(file, options.layer); });
+    clratio::require_same_shape(report.shape, image);
+    return image;
+}
+
+clratio::Image mean_of_files(const Options& options, Report& report) {
     clratio::Image mean;
     std::vector<double> sum;
     for (const auto& file : options.tau) {
-        mean = timed(decode, [&] { return clratio::read_image(file, options.layer); });
-        clratio::require_same_shape(shape, mean);
+        mean = read_like(file, options, report);
         sum.resize(mean.size());
         for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += mean.values[i];
     }
@@ -190,6 +196,15 @@ clratio::Moments add_all(ImageReader& reader, const clratio::Engine& engine, con
 
 // ---- what comes out
 
+// A missing error bar is no defect of a run that asked for none.
+std::uint32_t matters(const Options& options) {
+    return options.standard_error.empty() ? ~std::uint32_t{CLR_FLAG_NO_ERROR_BAR} : ~std::uint32_t{0};
+}
+
+std::uint64_t count_flagged(const std::vector<std::uint32_t>& flags, std::uint32_t mask) {
+    return static_cast<std::uint64_t>(std::count_if(flags.begin(), flags.end(), [&](auto f) { return (f & mask) != 0; }));
+}
+
 clratio::WriteOptions settings(const Options& options, const Report& report) {
     std::string tau = options.tau.front();
     for (std::size_t i = 1; i < options.tau.size(); ++i) tau += " " + options.tau[i];
@@ -209,17 +224,14 @@ void write_all(const Options& options, const clratio::CombinedImage& out, const 
     if (!options.flags.empty()) clratio::write_flags(options.flags, out.estimate, out.flag_image, with);
 }
 
-Scores scores(const Options& options, const clratio::Moments& sum, const clratio::Tau& tau, clratio::Image& estimate,
-              Report& report) {
-    const auto reference =
-        timed(report.seconds.decode, [&] { return clratio::read_image(options.reference, options.layer); });
+Scores scores(const Options& options, const clratio::Moments& sum, const clratio::Tau& tau, const clratio::Image& estimate,
+              const clratio::Image& reference, Report& report) {
     auto plain = options.combine();
     plain.estimator = Estimator::mean;
     plain.standard_error = false;
-    auto mean = timed(report.seconds.device,
-                      [&] { return clratio::combined_image(clratio::combine(sum, tau, plain), report.shape).estimate; });
-    mean.path = estimate.path = options.output;
-    return {difference(estimate, reference), difference(mean, reference)};
+    const auto mean = timed(report.seconds.device,
+                            [&] { return clratio::combined_image(clratio::combine(sum, tau, plain), report.shape); });
+    return {difference(estimate, reference), difference(mean.estimate, reference)};
 }
 
 Json json_of(const Options& options, const Report& r) {
@@ -249,8 +261,8 @@ Json json_of(const Options& options, const Report& r) {
     return out;
 }
 
-void print_flags(const Report& r) {
-    fmt::print("{} of {} values flagged\n", r.flags.any,
+void print_flags(const Options& options, const Report& r) {
+    fmt::print("{} of {} values flagged\n", r.flagged,
                static_cast<std::uint64_t>(r.shape.width()) * static_cast<std::uint64_t>(r.shape.height()) *
                    r.shape.channels.size());
     const auto line = [](std::uint64_t count, const char* what) {
@@ -260,15 +272,15 @@ void print_flags(const Report& r) {
     line(r.flags.zero_tau, "tau is 0: the impulse guard gave the value");
     line(r.flags.skipped, "a batch was not finite and left out");
     line(r.flags.no_data, "no finite batch: the value is 0");
-    line(r.flags.no_error_bar, "one batch: no error bar");
+    line(options.standard_error.empty() ? 0 : r.flags.no_error_bar, "fewer than two batches: no error bar");
     line(r.flags.nonfinite, "the estimate is not finite");
     line(r.negatives, "negative inputs (counted only)");
 }
 
 void print_text(const Options& options, const Report& r) {
-    fmt::print("{}: {} of {} batches, {}x{} pixels, {} channels, on {}\n", options.output, options.estimator, r.batches,
-               r.shape.width(), r.shape.height(), r.shape.channels.size(), r.device);
-    print_flags(r);
+    fmt::print("{}: {} of {} batch{}, {}x{} pixels, {} channels, on {}\n", options.output, options.estimator, r.batches,
+               r.batches == 1 ? "" : "es", r.shape.width(), r.shape.height(), r.shape.channels.size(), r.device);
+    print_flags(options, r);
     if (r.scores) {
         fmt::print("against {}\n  {:<15} {:>10} {:>12}\n", options.reference, "", "RMSE", "bias");
         fmt::print("  {:<15} {:>10.6f} {:>12.6f}\n", "plain mean", r.scores->mean.rmse, r.scores->mean.bias);
@@ -294,6 +306,11 @@ void require_different(const Options& options) {
     }
 }
 
+void require_error_bar(const Options& options) {
+    if (!options.standard_error.empty() && options.estimator == "mean-of-ratios")
+        throw UsageError("--stderr: mean-of-ratios has no standard error; ratio and mean have one");
+}
+
 // A folder that is not there is said before the work, not after it.
 void require_folders(const Options& options) {
     for (const std::filesystem::path file : {options.output, options.standard_error, options.flags})
@@ -304,6 +321,7 @@ void require_folders(const Options& options) {
 int combine(const Options& options) {
     require_counts(options);
     require_different(options);
+    require_error_bar(options);
     TauInput tau{tau_numbers(options), {}};
     require_folders(options);
 
@@ -316,7 +334,10 @@ int combine(const Options& options) {
     if (tau.numbers.size() > 1 && tau.numbers.size() != report.shape.channels.size())
         throw UsageError(fmt::format("--tau: {} numbers for the {} channels of {}", tau.numbers.size(),
                                      report.shape.channels.size(), first.m.path));
-    if (tau.numbers.empty()) tau.image = mean_of_files(options, report.shape, report.seconds.decode);
+    if (tau.numbers.empty()) tau.image = mean_of_files(options, report);
+
+    const clratio::Image reference =
+        options.reference.empty() ? clratio::Image{} : read_like(options.reference, options, report);
 
     const auto sum = add_all(reader, engine, options, std::move(first), report);
     report.seconds.decode += reader.seconds();
@@ -324,15 +345,16 @@ int combine(const Options& options) {
     auto out = timed(report.seconds.device,
                      [&] { return clratio::combined_image(clratio::combine(sum, tau, options.combine()), report.shape); });
     report.flags = out.flags;
+    report.flagged = count_flagged(out.flag_image, matters(options));
     report.negatives = timed(report.seconds.device, [&] { return sum.negatives(); });
-    if (!options.reference.empty()) report.scores = scores(options, sum, tau, out.estimate, report);
+    if (!options.reference.empty()) report.scores = scores(options, sum, tau, out.estimate, reference, report);
     timed(report.seconds.encode, [&] { write_all(options, out, report); });
 
     if (options.json)
         print(json_of(options, report));
     else
         print_text(options, report);
-    return options.fail_on_flag && report.flags.any > 0 ? flagged : ok;
+    return options.fail_on_flag && report.flagged > 0 ? flagged : ok;
 }
 
 constexpr auto footer =
@@ -359,7 +381,8 @@ Files: half, float or uint EXR; scanline, tiled or multi-part; all of one size, 
 layer in one file, --layer one for all; with one colour layer in the file it is found without asking. Alpha is taken
 from the first file of --m. The output is float, ZIP, with the windows and attributes of that file and the settings used.
 --flags: a UINT for each value; 1 mean t is 0, 2 tau is 0, 4 batch skipped, 8 no data, 16 no error bar, 32 not finite.
---stderr: the standard error by the delta method; +inf with one batch.
+--stderr: the standard error by the delta method; +inf with one batch. Without it a missing error bar is no flag that
+--fail-on-flag looks at.
 
 Exit codes: 0 done, 1 failed, 2 usage, 3 done but values were flagged and --fail-on-flag was given.
 
@@ -377,7 +400,7 @@ void add_combine(CLI::App& app, Run& run) {
     const auto choice = [&](const char* name, std::string& value, const auto& map, const char* help) {
         std::vector<std::string> words;
         for (const auto& entry : map) words.push_back(entry.first);
-        command->add_option(name, value, help)->check(CLI::IsMember(words))->capture_default_str();
+        command->add_option(name, value, help)->type_name("")->check(CLI::IsMember(words))->capture_default_str();
     };
     command->add_option("--m", o->m, "Batches of m, one file each")->required()->type_name("FILE");
     command->add_option("--t", o->t, "Batches of t, in the same order")->required()->type_name("FILE");

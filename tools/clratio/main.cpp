@@ -30,7 +30,7 @@ int run_command(int argc, char** argv) {
     CLI::App app{"clratio: ratio estimators on OpenCL"};
     app.name("clratio");
     app.set_version_flag("--version", std::string("clratio ") + CLRATIO_VERSION);
-    app.require_subcommand(1);
+    app.require_subcommand(0, 1);
     app.footer(footer);
     tool::Run run;
     for (const auto add : add_commands) add(app, run);
@@ -40,6 +40,7 @@ int run_command(int argc, char** argv) {
         if (e.get_exit_code() == 0) return app.exit(e);
         return fail(std::string(e.what()) + " (see clratio --help)", tool::usage);
     }
+    if (!run) return fail("a subcommand is needed: devices, combine, ... (see clratio --help)", tool::usage);
     try {
         return run();
     } catch (const tool::UsageError& e) {
