@@ -400,7 +400,7 @@ void add_combine(CLI::App& app, Run& run) {
     const auto choice = [&](const char* name, std::string& value, const auto& map, const char* help) {
         std::vector<std::string> words;
         for (const auto& entry : map) words.push_back(entry.first);
-        command->add_option(name, value, help)->type_name("")->check(CLI::IsMember(words))->capture_default_str();
+        command->add_option(name, value, help)->type_name("WORD")->check(CLI::IsMember(words))->capture_default_str();
     };
     command->add_option("--m", o->m, "Batches of m, one file each")->required()->type_name("FILE");
     command->add_option("--t", o->t, "Batches of t, in the same order")->required()->type_name("FILE");
