@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "bands.hpp"
 #include "difference.hpp"
 #include "image_reader.hpp"
 #include "progress_line.hpp"
@@ -160,38 +161,49 @@ void require_finite(const clratio::Image& image) {
     }
 }
 
-/// The next pair, and those that are read already, as many as one launch takes.
+/// The next pair, and those that are read already, as many as one launch takes; all of them where that is all there is.
 std::vector<Pair> next_pairs(ImageReader& reader, const clratio::Image& shape, Pair&& waiting) {
     std::vector<Pair> pairs;
     pairs.push_back(std::move(waiting));
     const std::size_t bytes = 2 * sizeof(float) * pairs.front().m.values.size();
     const std::size_t most = std::clamp<std::size_t>(memory_budget / bytes, 1, most_in_a_launch);
-    while (pairs.size() < most && reader.left() > 0 && reader.ready(2)) pairs.push_back(next_pair(reader, &shape));
+    const bool wait = 1 + reader.left() / 2 <= most;
+    while (pairs.size() < most && reader.left() > 0 && (wait || reader.ready(2))) pairs.push_back(next_pair(reader, &shape));
     return pairs;
 }
 
-void add(clratio::Moments& sum, const std::vector<Pair>& pairs, double& device) {
+std::vector<clratio::HostBatch> batches_of(const std::vector<Pair>& pairs, const Options& options) {
     std::vector<clratio::HostBatch> batches;
     for (const Pair& pair : pairs) {
-        if (sum.options().nonfinite == NonFinite::fail) {
+        if (options.moments().nonfinite == NonFinite::fail) {
             require_finite(pair.m);
             require_finite(pair.t);
         }
         batches.push_back({pair.m, pair.t});
     }
-    timed(device, [&] { sum.add(batches); });
+    return batches;
 }
 
-clratio::Moments add_all(ImageReader& reader, const clratio::Engine& engine, const Options& options, Pair&& first,
-                         Report& report) {
-    ProgressLine line;
-    auto sum = timed(report.seconds.device, [&] { return clratio::Moments(engine, first.m.size(), options.moments()); });
-    add(sum, next_pairs(reader, report.shape, std::move(first)), report.seconds.device);
-    while (reader.left() > 0) {
-        line.show(fmt::format("{} of {} batches", sum.batches(), options.m.size()));
-        add(sum, next_pairs(reader, report.shape, next_pair(reader, &report.shape)), report.seconds.device);
+ReadOut combine_all(ImageReader& reader, const clratio::Engine& engine, const Options& options, const clratio::Tau& tau,
+                    Pair&& first, Report& report) {
+    const bool with_mean = !options.reference.empty();
+    Bands bands(engine, first.m.size(), report.shape.channels.size(), options.moments());
+    auto pairs = next_pairs(reader, report.shape, std::move(first));
+    report.batches = pairs.size();
+    if (reader.left() == 0) {
+        const auto batches = batches_of(pairs, options);
+        return timed(report.seconds.device, [&] { return bands.at_once(batches, tau, options.combine(), with_mean); });
     }
-    return sum;
+    ProgressLine line;
+    for (;;) {
+        const auto batches = batches_of(pairs, options);
+        timed(report.seconds.device, [&] { bands.add(batches); });
+        if (reader.left() == 0) break;
+        line.show(fmt::format("{} of {} batches", report.batches, options.m.size()));
+        pairs = next_pairs(reader, report.shape, next_pair(reader, &report.shape));
+        report.batches += pairs.size();
+    }
+    return timed(report.seconds.device, [&] { return bands.read_out(tau, options.combine(), with_mean); });
 }
 
 // ---- what comes out
@@ -222,16 +234,6 @@ void write_all(const Options& options, const clratio::CombinedImage& out, const 
     clratio::write_image(options.output, out.estimate, with);
     if (!options.standard_error.empty()) clratio::write_image(options.standard_error, out.standard_error, with);
     if (!options.flags.empty()) clratio::write_flags(options.flags, out.estimate, out.flag_image, with);
-}
-
-Scores scores(const Options& options, const clratio::Moments& sum, const clratio::Tau& tau, const clratio::Image& estimate,
-              const clratio::Image& reference, Report& report) {
-    auto plain = options.combine();
-    plain.estimator = Estimator::mean;
-    plain.standard_error = false;
-    const auto mean = timed(report.seconds.device,
-                            [&] { return clratio::combined_image(clratio::combine(sum, tau, plain), report.shape); });
-    return {difference(estimate, reference), difference(mean.estimate, reference)};
 }
 
 Json json_of(const Options& options, const Report& r) {
@@ -339,15 +341,16 @@ int combine(const Options& options) {
     const clratio::Image reference =
         options.reference.empty() ? clratio::Image{} : read_like(options.reference, options, report);
 
-    const auto sum = add_all(reader, engine, options, std::move(first), report);
+    auto read_out = combine_all(reader, engine, options, tau, std::move(first), report);
     report.seconds.decode += reader.seconds();
-    report.batches = sum.batches();
-    auto out = timed(report.seconds.device,
-                     [&] { return clratio::combined_image(clratio::combine(sum, tau, options.combine()), report.shape); });
+    const auto out = clratio::combined_image(std::move(read_out.chosen), report.shape);
     report.flags = out.flags;
     report.flagged = count_flagged(out.flag_image, matters(options));
-    report.negatives = timed(report.seconds.device, [&] { return sum.negatives(); });
-    if (!options.reference.empty()) report.scores = scores(options, sum, tau, out.estimate, reference, report);
+    report.negatives = read_out.negatives;
+    if (!options.reference.empty()) {
+        const auto mean = clratio::combined_image(std::move(read_out.mean), report.shape);
+        report.scores = {difference(out.estimate, reference), difference(mean.estimate, reference)};
+    }
     timed(report.seconds.encode, [&] { write_all(options, out, report); });
 
     if (options.json)
