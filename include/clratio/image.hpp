@@ -6,6 +6,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "clratio/combine.hpp"
@@ -42,8 +43,12 @@ public:
 
 /// Reads half, float or uint; Y, RGB, RGBA or named channels; scanline, tiled or multi-part; any compression.
 /// `spec` is "FILE" or "FILE:LAYER"; `layer` is used where spec names none. With one colour layer in the file it is
-/// found without asking. Errors: IoError with path, layer and reason: missing, damaged, subsampled, deep, no such layer,
-/// several layers and none named (they are listed).
+/// found without asking; of several, the one without a name (plain R, G, B). A part of a multi-part file is a layer too,
+/// called by the part's name. A layer that is no colour gives all its channels but alpha.
+/// Shapes: the data window's pixels. Values: as stored, NaN and infinity too; uint becomes the nearest float.
+/// Errors: IoError with path, layer and reason: missing, damaged, incomplete, subsampled, deep, no such layer,
+/// several layers and none named (they are listed). Damage inside uncompressed or lossy pixel data cannot be seen:
+/// OpenEXR has checksums only where zlib made them (ZIP, ZIPS, PXR24).
 Image read_image(const std::string& spec, const std::string& layer = "");
 
 struct WriteOptions {
@@ -51,9 +56,11 @@ struct WriteOptions {
         attributes;  ///< string attributes to add, e.g. {"clratio/estimator", "ratio"}
 };
 
-/// Writes float32 channels (and alpha where there is one), ZIP, with windows and metadata of the image. Written beside
-/// `path` through checked writes, synced, reopened and compared, then renamed over it: either the whole new file stands
-/// there or what was there before. Errors: IoError.
+/// Writes float32 channels (and alpha where there is one) under their plain names, ZIP, with windows and metadata of the
+/// image; an empty display window means the data window. Bits are kept, those of NaN too. Written beside `path` through
+/// checked writes, synced, reopened and compared, then renamed over it: either the whole new file stands there or what was
+/// there before. A symbolic link is followed. Errors: InvalidArgument where counts do not fit the window, IoError.
+/// Where a file-size limit is set, SIGXFSZ must be ignored, or the system ends the process instead.
 void write_image(const std::filesystem::path& path, const Image& image, const WriteOptions& options = {});
 
 /// The same for a flag image: one UINT channel for each channel of `like`.
@@ -69,6 +76,9 @@ struct CombinedImage {
     std::vector<std::uint32_t> flag_image;
     FlagCounts flags;
 };
+/// Gives a read-out the windows, channels, alpha and metadata of `like`. Errors: none; the counts are the caller's to match.
+CombinedImage combined_image(Combined&& combined, const Image& like);
+/// Reads out with an image of tau, whose shape and metadata the result takes.
 CombinedImage combine(const Moments& moments, const Image& tau, CombineOptions options = {});
 
 }  // namespace clratio

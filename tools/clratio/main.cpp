@@ -1,1 +1,60 @@
-int main() { return 0; }
+// The command line. A subcommand is one file with one add_ function; it is registered here.
+#include <csignal>
+#include <cstdio>
+
+#include "tool.hpp"
+
+namespace {
+
+constexpr auto footer = R"(Exit codes:
+  0  done
+  1  failed: a file, a device (one line on stderr names it)
+  2  usage: the arguments do not parse or do not fit together
+  3  done, but values were flagged and --fail-on-flag was given
+
+Examples:
+  clratio devices
+  clratio combine --m m_*.exr --t t_*.exr --tau tau.exr -o out.exr
+  clratio compare out.exr reference.exr
+
+The environment variable CLRATIO_DEVICE ("0:0", "cpu", "gpu", or a part of a name) chooses the device.)";
+
+constexpr auto add_commands = {tool::add_devices, tool::add_combine, tool::add_compare, tool::add_picture};
+
+int fail(const std::string& what, int code) {
+    fmt::print(stderr, "clratio: {}\n", what);
+    return code;
+}
+
+int run_command(int argc, char** argv) {
+    CLI::App app{"clratio: ratio estimators on OpenCL"};
+    app.name("clratio");
+    app.set_version_flag("--version", std::string("clratio ") + CLRATIO_VERSION);
+    app.require_subcommand(0, 1);
+    app.footer(footer);
+    tool::Run run;
+    for (const auto add : add_commands) add(app, run);
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError& e) {
+        if (e.get_exit_code() == 0) return app.exit(e);
+        return fail(std::string(e.what()) + " (see clratio --help)", tool::usage);
+    }
+    if (!run) return fail("a subcommand is needed: devices, combine, ... (see clratio --help)", tool::usage);
+    try {
+        return run();
+    } catch (const tool::UsageError& e) {
+        return fail(e.what(), tool::usage);
+    } catch (const std::exception& e) {
+        return fail(e.what(), tool::failed);
+    }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    std::signal(SIGXFSZ, SIG_IGN);  // a file-size limit is an error of the write, not the end of the process
+    const int code = run_command(argc, argv);
+    if (std::fflush(stdout) != 0 || std::ferror(stdout)) return fail("standard output cannot be written", tool::failed);
+    return code;
+}

@@ -1,0 +1,50 @@
+#include "clratio/image.hpp"
+
+namespace clratio {
+namespace {
+
+std::string text(const Window& w) {
+    return "(" + std::to_string(w.x0) + "," + std::to_string(w.y0) + ")-(" + std::to_string(w.x1) + "," +
+           std::to_string(w.y1) + ")";
+}
+
+std::string shape_of(const Image& image) {
+    std::string channels;
+    for (const auto& c : image.channels) channels += (channels.empty() ? "" : ",") + c;
+    return (image.path.empty() ? "an image made here" : image.path) + " with " + std::to_string(image.width()) + "x" +
+           std::to_string(image.height()) + " pixels, channels " + channels + ", data window " + text(image.data_window) +
+           ", display window " + text(image.display_window);
+}
+
+Image in_the_shape_of(const Image& like, std::vector<float>&& values) {
+    Image image;
+    image.channels = like.channels;
+    image.values = std::move(values);
+    image.alpha = like.alpha;
+    image.data_window = like.data_window;
+    image.display_window = like.display_window;
+    image.metadata = like.metadata;
+    return image;
+}
+
+}  // namespace
+
+void require_same_shape(const Image& a, const Image& b) {
+    if (a.channels != b.channels || a.data_window != b.data_window || a.display_window != b.display_window)
+        throw InvalidArgument("images of one shape", shape_of(a), shape_of(b));
+}
+
+CombinedImage combined_image(Combined&& combined, const Image& like) {
+    CombinedImage image;
+    image.estimate = in_the_shape_of(like, std::move(combined.estimate));
+    if (!combined.standard_error.empty()) image.standard_error = in_the_shape_of(like, std::move(combined.standard_error));
+    image.flag_image = std::move(combined.flag_image);
+    image.flags = combined.flags;
+    return image;
+}
+
+CombinedImage combine(const Moments& moments, const Image& tau, CombineOptions options) {
+    return combined_image(combine(moments, Tau(tau), options), tau);
+}
+
+}  // namespace clratio

@@ -1,0 +1,92 @@
+#include "bands.hpp"
+
+#include <algorithm>
+
+namespace tool {
+namespace {
+
+using clratio::Combined, clratio::CombineOptions, clratio::HostBatch, clratio::Moments, clratio::Tau;
+
+constexpr std::uint64_t values_in_a_band = 1 << 19;  // of 2^16 .. 2^20 the fastest
+
+Tau slice(const Tau& tau, std::uint64_t begin, std::uint64_t size) {
+    return tau.numbers.empty() ? Tau(tau.image.subspan(begin, size)) : tau;
+}
+
+template <class T> void append(std::vector<T>& to, const std::vector<T>& more) {
+    to.insert(to.end(), more.begin(), more.end());
+}
+
+void append(Combined& to, const Combined& more) {
+    append(to.estimate, more.estimate);
+    append(to.standard_error, more.standard_error);
+    append(to.flag_image, more.flag_image);
+    to.flags.zero_denominator += more.flags.zero_denominator;
+    to.flags.zero_tau += more.flags.zero_tau;
+    to.flags.skipped += more.flags.skipped;
+    to.flags.no_data += more.flags.no_data;
+    to.flags.no_error_bar += more.flags.no_error_bar;
+    to.flags.nonfinite += more.flags.nonfinite;
+    to.flags.any += more.flags.any;
+}
+
+void reserve(Combined& result, std::uint64_t values, bool standard_error) {
+    result.estimate.reserve(values);
+    result.flag_image.reserve(values);
+    if (standard_error) result.standard_error.reserve(values);
+}
+
+CombineOptions plain_mean(CombineOptions options) {
+    options.estimator = clratio::Estimator::mean;
+    options.standard_error = false;
+    return options;
+}
+
+}  // namespace
+
+Bands::Bands(const clratio::Engine& engine, std::uint64_t values, std::uint64_t channels, clratio::MomentsOptions options)
+    : engine_(engine), values_(values), band_(std::max(values_in_a_band / channels, std::uint64_t{1}) * channels),
+      options_(options) {}
+
+void Bands::add_slices(Moments& to, std::uint64_t band, std::span<const HostBatch> batches) const {
+    std::vector<HostBatch> slices;
+    for (const auto& b : batches)
+        slices.push_back({b.m.subspan(begin(band), size(band)), b.t.subspan(begin(band), size(band)), b.weight});
+    to.add(slices);
+}
+
+void Bands::add(std::span<const HostBatch> batches) {
+    for (std::uint64_t band = 0; band < bands(); ++band) {
+        if (band == states_.size()) states_.push_back(make(band));
+        add_slices(states_[band], band, batches);
+    }
+}
+
+template <class State> ReadOut Bands::read(State state, const Tau& tau, CombineOptions options, bool with_mean) const {
+    ReadOut out;
+    reserve(out.chosen, values_, options.standard_error);
+    if (with_mean) reserve(out.mean, values_, false);
+    for (std::uint64_t band = 0; band < bands(); ++band) {
+        const Moments moments = state(band);
+        const Tau part = slice(tau, begin(band), size(band));
+        append(out.chosen, clratio::combine(moments, part, options));
+        if (with_mean) append(out.mean, clratio::combine(moments, part, plain_mean(options)));
+        out.negatives += moments.negatives();
+    }
+    return out;
+}
+
+ReadOut Bands::read_out(const Tau& tau, CombineOptions options, bool with_mean) const {
+    return read([&](std::uint64_t band) { return states_[band]; }, tau, options, with_mean);
+}
+
+ReadOut Bands::at_once(std::span<const HostBatch> batches, const Tau& tau, CombineOptions options, bool with_mean) const {
+    const auto summed = [&](std::uint64_t band) {
+        Moments moments = make(band);
+        add_slices(moments, band, batches);
+        return moments;
+    };
+    return read(summed, tau, options, with_mean);
+}
+
+}  // namespace tool

@@ -1,0 +1,103 @@
+// clratio picture: images side by side as one PNG.
+#include <png.h>
+
+#include <cmath>
+#include <cstdio>
+
+#include "clratio/image.hpp"
+#include "label.hpp"
+#include "tool.hpp"
+
+namespace tool {
+namespace {
+
+constexpr int gap = 4;  // pixels between images
+constexpr std::uint8_t paper = 255;
+
+struct Options {
+    std::vector<std::string> images, titles;
+    std::string output, layer;
+    double exposure = 0;  ///< stops
+};
+
+// IEC 61966-2-1. NaN and infinity have no colour: the caller marks them.
+std::uint8_t srgb(double linear) {
+    const double x = std::clamp(linear, 0.0, 1.0);
+    const double encoded = x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1 / 2.4) - 0.055;
+    return static_cast<std::uint8_t>(std::lround(255 * encoded));
+}
+
+void require_colour(const clratio::Image& image) {
+    if (image.channels.size() != 1 && image.channels.size() != 3)
+        throw clratio::IoError(image.path, image.layer,
+                               "a picture needs 1 or 3 channels, this has " + std::to_string(image.channels.size()));
+}
+
+Canvas draw(const std::vector<clratio::Image>& images, const Options& options) {
+    const int width = images.front().width(), height = images.front().height();
+    const int top = options.titles.empty() ? 0 : label_height + gap;
+    const int count = static_cast<int>(images.size());
+    Canvas canvas(count * (width + gap) - gap, top + height, paper);
+    const double scale = std::exp2(options.exposure);
+    for (int i = 0; i < count; ++i) {
+        const auto& image = images[static_cast<std::size_t>(i)];
+        const std::size_t channels = image.channels.size();
+        const int left = i * (width + gap);
+        if (!options.titles.empty()) draw_label(canvas, left, width, options.titles[static_cast<std::size_t>(i)]);
+        for (int y = 0; y < height; ++y)
+            for (int x = 0; x < width; ++x) {
+                const float* value = &image.values[(static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+                                                    static_cast<std::size_t>(x)) *
+                                                   channels];
+                std::array<std::uint8_t, 3> colour{};
+                for (std::size_t c = 0; c < 3; ++c) colour[c] = srgb(scale * value[channels == 1 ? 0 : c]);
+                if (!std::all_of(value, value + channels, [](float v) { return std::isfinite(v); })) colour = {255, 0, 255};
+                canvas.set(left + x, top + y, colour);
+            }
+    }
+    return canvas;
+}
+
+void write_png(const std::string& path, const Canvas& canvas) {
+    png_image png{};
+    png.version = PNG_IMAGE_VERSION;
+    png.width = static_cast<png_uint_32>(canvas.width());
+    png.height = static_cast<png_uint_32>(canvas.height());
+    png.format = PNG_FORMAT_RGB;
+    if (!png_image_write_to_file(&png, path.c_str(), 0, canvas.bytes(), 0, nullptr))
+        throw clratio::IoError(path, "", std::string("cannot be written: ") + png.message);
+}
+
+int picture(const Options& options) {
+    if (!options.titles.empty() && options.titles.size() != options.images.size())
+        throw UsageError(fmt::format("--titles has {} titles for {} images", options.titles.size(), options.images.size()));
+    std::vector<clratio::Image> images;
+    for (const auto& file : options.images) {
+        images.push_back(clratio::read_image(file, options.layer));
+        require_colour(images.back());
+        clratio::require_same_shape(images.front(), images.back());
+    }
+    const Canvas canvas = draw(images, options);
+    write_png(options.output, canvas);
+    fmt::print("{}: {} images, {}x{} pixels\n", options.output, images.size(), canvas.width(), canvas.height());
+    return ok;
+}
+
+}  // namespace
+
+void add_picture(CLI::App& app, Run& run) {
+    auto o = std::make_shared<Options>();
+    auto* command = app.add_subcommand("picture", "Put images side by side in one PNG");
+    command->add_option("images", o->images, "Images of one shape, Y or RGB")->required()->type_name("FILE");
+    command->add_option("-o,--output", o->output, "The PNG")->required()->type_name("OUT.png");
+    command->add_option("--exposure", o->exposure, "Brighten by this many stops")->type_name("STOPS")->capture_default_str();
+    command->add_option("--titles", o->titles, "One for each image, with commas between")
+        ->delimiter(',')
+        ->type_name("TEXT,...");
+    command->add_option("--layer", o->layer, "The layer to read where a file names none")->type_name("NAME");
+    command->footer("Values 0 to 1 get the sRGB transfer curve, others are clipped; a NaN or an infinity is magenta.\n\n"
+                    "Example: clratio picture mean.exr out.exr reference.exr -o side.png --titles mean,ratio,reference");
+    command->callback([=, &run] { run = [o] { return picture(*o); }; });
+}
+
+}  // namespace tool

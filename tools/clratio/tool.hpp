@@ -1,0 +1,36 @@
+// What the subcommands share: how they join the command line, and how they end.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <functional>
+#include <stdexcept>
+#include <string>
+
+namespace tool {
+
+enum Exit { ok = 0, failed = 1, usage = 2, flagged = 3 };
+
+/// Arguments that parse, but do not fit together: exit code 2.
+class UsageError : public std::runtime_error {
+public:
+    using std::runtime_error::runtime_error;
+};
+
+/// What the chosen subcommand does once its options are read; returns the exit code.
+using Run = std::function<int()>;
+
+// Each adds its subcommand, which sets `run` when it is the one called.
+void add_devices(CLI::App& app, Run& run);
+void add_combine(CLI::App& app, Run& run);
+void add_compare(CLI::App& app, Run& run);
+void add_picture(CLI::App& app, Run& run);
+
+/// Keys in the order they were set, as a reader would want them.
+using Json = nlohmann::ordered_json;
+
+inline void print(const Json& object) { fmt::print("{}\n", object.dump(2)); }
+
+}  // namespace tool
