@@ -26,8 +26,8 @@ CLR_NAMESPACE_END
 #define CLR_LAW_NODES 6
 #define CLR_LAW_NODE clr_gauss_node
 #define CLR_LAW_WEIGHT clr_gauss_weight
-#define CLR_LAW_CUT CLR_LAW_K(5.5)      // exp(-CUT^2 / 2) is below the rounding of T
-#define CLR_LAW_FAR CLR_LAW_K(10.2)     // erfc is 0 beyond
+#define CLR_LAW_CUT CLR_LAW_K(5.5)       // exp(-CUT^2 / 2) is below the rounding of T
+#define CLR_LAW_FAR CLR_LAW_K(10.2)      // erfc is 0 beyond
 #define CLR_LAW_TINY CLR_LAW_K(1.0e-18)  // its square is a normal number
 #define CLR_LAW_LEAST CLR_LAW_K(1.0e-37)
 #include "clratio/device/law_formulas.h"

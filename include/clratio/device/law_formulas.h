@@ -135,14 +135,22 @@ CLR_FN CLR_LAW_REAL clr_law_published_log_pdf(CLR_LAW_MODEL m, CLR_LAW_REAL x) {
     return clr_law_published_log_pdf_at(m, clr_law_locate(m, x));
 }
 
-CLR_FN CLR_LAW_REAL clr_law_cdf(CLR_LAW_MODEL m, CLR_LAW_REAL x) {
+// Nothing lies beyond a point mass at 0, nor on it where x == 0.
+CLR_FN CLR_LAW_REAL clr_law_tail(CLR_LAW_MODEL m, CLR_LAW_REAL x) {
     const CLR_LAW_REAL tail = clr_law_tail_at(m, clr_law_locate(m, x));
-    return x < CLR_LAW_K(0.0) ? tail : CLR_LAW_K(1.0) - tail;
+    const CLR_LAW_REAL none = x == x ? CLR_LAW_K(0.0) : x;
+    return m.inverse_sd < (CLR_LAW_REAL)(INFINITY) ? tail : none;
+}
+
+// The side is that of x in units of sd, where the least x may round to 0.
+CLR_FN CLR_LAW_REAL clr_law_cdf(CLR_LAW_MODEL m, CLR_LAW_REAL x) {
+    const CLR_LAW_REAL tail = clr_law_tail(m, x);
+    return x * m.inverse_sd < CLR_LAW_K(0.0) ? tail : CLR_LAW_K(1.0) - tail;
 }
 
 CLR_FN CLR_LAW_REAL clr_law_sf(CLR_LAW_MODEL m, CLR_LAW_REAL x) {
-    const CLR_LAW_REAL tail = clr_law_tail_at(m, clr_law_locate(m, x));
-    return x < CLR_LAW_K(0.0) ? CLR_LAW_K(1.0) - tail : tail;
+    const CLR_LAW_REAL tail = clr_law_tail(m, x);
+    return x * m.inverse_sd < CLR_LAW_K(0.0) ? CLR_LAW_K(1.0) - tail : tail;
 }
 
 CLR_NAMESPACE_END
