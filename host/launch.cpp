@@ -51,6 +51,15 @@ Buffer Buffer::from_host(const Engine& engine, std::span<const std::byte> bytes)
     return b;
 }
 
+Buffer Buffer::copy_of(const Engine& engine, std::span<const std::byte> bytes) {
+    Buffer b;
+    b.queue_ = engine.state().queue;
+    b.memory_ = allocate(engine, CL_MEM_READ_ONLY | (bytes.empty() ? cl_mem_flags{0} : CL_MEM_COPY_HOST_PTR), bytes.size(),
+                         bytes.empty() ? nullptr : const_cast<std::byte*>(bytes.data()));
+    b.size_ = bytes.size();
+    return b;
+}
+
 Buffer Buffer::onto_host(const Engine& engine, std::span<std::byte> bytes) {
     Buffer b;
     const bool in_place = engine.info().host_memory && !bytes.empty();

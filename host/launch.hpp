@@ -23,6 +23,7 @@ public:
     Buffer(const Engine& engine, std::size_t bytes);
     static Buffer zeroed(const Engine& engine, std::size_t bytes);
     static Buffer from_host(const Engine& engine, std::span<const std::byte> bytes);  ///< read by kernels
+    static Buffer copy_of(const Engine& engine, std::span<const std::byte> bytes);    ///< the host memory may go at once
     static Buffer onto_host(const Engine& engine, std::span<std::byte> bytes);        ///< written; see publish()
 
     void read(std::span<std::byte> to, std::size_t offset = 0) const;
