@@ -32,11 +32,7 @@ Buffer::Buffer(const Engine& engine, std::size_t bytes)
 
 Buffer Buffer::zeroed(const Engine& engine, std::size_t bytes) {
     Buffer b(engine, bytes);
-    const cl_uint zero = 0;
-    cl_event filled = nullptr;
-    check(clEnqueueFillBuffer(b.queue_.get(), b.mem(), &zero, sizeof zero, 0, bytes, 0, nullptr, &filled),
-          "clEnqueueFillBuffer");
-    wait(Event(filled));
+    b.write(std::vector<std::byte>(bytes));
     return b;
 }
 

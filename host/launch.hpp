@@ -21,7 +21,7 @@ class Buffer {
 public:
     Buffer() = default;
     Buffer(const Engine& engine, std::size_t bytes);
-    static Buffer zeroed(const Engine& engine, std::size_t bytes);
+    static Buffer zeroed(const Engine& engine, std::size_t bytes);  ///< for small ones: zeros are copied from the host
     static Buffer from_host(const Engine& engine, std::span<const std::byte> bytes);  ///< read by kernels
     static Buffer copy_of(const Engine& engine, std::span<const std::byte> bytes);    ///< the host memory may go at once
     static Buffer onto_host(const Engine& engine, std::span<std::byte> bytes);        ///< written; see publish()

@@ -135,7 +135,7 @@ void check_batches(const Moments::State& s, std::span<const Batch> batches) {
 Moments::Moments(const Engine& engine, std::uint64_t values, MomentsOptions options)
     : state_(make_state(engine, values, options)) {
     for (auto plane : planes_of(options)) {
-        const Buffer b = Buffer::zeroed(engine, bytes_of(plane, values));
+        const Buffer b(engine, bytes_of(plane, values));
         state_->planes.*plane = b.mem();
         state_->owned.push_back(Memory::share(b.mem()));
     }
@@ -239,9 +239,10 @@ std::vector<std::uint32_t> Moments::bits(cl_mem StatePlanes::*plane) const {
     const auto& s = *state_;
     const cl_mem mem = s.planes.*plane;
     if (!mem) return {};
-    wait(s.last);
     const std::size_t parts = plane == &StatePlanes::batches ? 1 : 2;
     std::vector<std::uint32_t> out(parts * s.values);
+    if (s.batches == 0) return out;
+    wait(s.last);
     for (std::size_t p = 0; p < parts; ++p)
         check(clEnqueueReadBuffer(s.engine.queue(), mem, CL_TRUE, p * plane_stride(s.values) * sizeof(float),
                                   s.values * sizeof(float), out.data() + p * s.values, 0, nullptr, nullptr),

@@ -17,8 +17,6 @@ static inline clr_entry clr_entry_of(const clr_batch* batch) {
     return e;
 }
 
-static inline clr_uint clr_batches_of(clr_planes planes, ulong i) { return clr_bits(clr_load(planes.batches + i)); }
-
 // The inputs of one launch.
 typedef struct {
     global const float *m[CLR_BATCHES_PER_LAUNCH], *t[CLR_BATCHES_PER_LAUNCH];
@@ -39,7 +37,7 @@ typedef struct {
 
 static inline clr_real clr_lost_before(clr_planes planes, clr_state s, ulong i) {
     if (!(s.options & CLR_STATE_PER_VALUE)) return (clr_real)(0.0f);
-    return clr_batches_of(planes, i) == (clr_uint)(s.batches) ? (clr_real)(0.0f) : (clr_real)(1.0f);
+    return clr_load_batches(planes, s, i) == (clr_uint)(s.batches) ? (clr_real)(0.0f) : (clr_real)(1.0f);
 }
 
 // Batch k over a block of whole vectors of contiguous values. The first pass takes the state from the planes, the last one puts
@@ -62,7 +60,7 @@ static inline uint clr_pass(const bool is_first, const bool is_last, uint k, con
         const clr_real doubt = clr_fma(m, zero, clr_fma(t, zero, before));
         below += clr_one_where(m < zero) + clr_one_where(t < zero);
         const clr_moments moments =
-            clr_moments_add(is_first ? clr_load_moments(planes, s.stride, at) : block->moments[v], m, t, e);
+            clr_moments_add(is_first ? clr_load_moments(planes, s, at) : block->moments[v], m, t, e);
         if (!is_last) {
             block->moments[v] = moments;
             block->doubt[v] = doubt;
@@ -156,15 +154,15 @@ kernel void clr_merge(CLR_PLANE_ARGUMENTS(a), CLR_PLANE_ARGUMENTS(b), clr_batch 
     const clr_span span = clr_my_span(range);
     for (ulong v = span.begin; v < span.end; v += span.step) {
         const ulong first = v * CLR_WIDTH;
-        const clr_moments moments = clr_load_moments(to, a_state.stride, first);
-        const clr_moments other = clr_load_moments(from, b_state.stride, first);
+        const clr_moments moments = clr_load_moments(to, a_state, first);
+        const clr_moments other = clr_load_moments(from, b_state, first);
         clr_entry e = clr_entry_of(&entry);
         if (skips) {
             clr_two weight = clr_both(entry.sum_hi, entry.sum_lo);
-            const clr_uint batches = clr_batches_of(to, first), more = clr_batches_of(from, first);
+            const clr_uint batches = clr_load_batches(to, a_state, first), more = clr_load_batches(from, b_state, first);
             if (clr_any(clr_lost_before(to, a_state, first) + clr_lost_before(from, b_state, first) != zero)) {
-                const clr_two before = clr_load_two(to.weight, first, a_state.stride);
-                const clr_two added = clr_load_two(from.weight, first, b_state.stride);
+                const clr_two before = clr_load_plane(to.weight, a_state, first);
+                const clr_two added = clr_load_plane(from.weight, b_state, first);
                 weight = clr_two_add(before, added);
                 e = clr_entry_make(before, added, weight);
             }
@@ -172,8 +170,8 @@ kernel void clr_merge(CLR_PLANE_ARGUMENTS(a), CLR_PLANE_ARGUMENTS(b), clr_batch 
         }
         clr_store_moments(clr_moments_merge(moments, other, e), to, a_state.stride, first);
         if (a_state.options & CLR_STATE_RATIOS) {
-            const clr_ratios sum = clr_ratios_merge(clr_load_ratios(to, a_state.stride, first),
-                                                    clr_load_ratios(from, b_state.stride, first), e);
+            const clr_ratios sum = clr_ratios_merge(clr_load_ratios(to, a_state, first),
+                                                    clr_load_ratios(from, b_state, first), e);
             clr_store_ratios(sum, to, a_state.stride, first);
         }
     }

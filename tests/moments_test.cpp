@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 
+#include "launch.hpp"
 #include "support/samples.hpp"
 #include "support/shapes.hpp"
 #include "support/twin.hpp"
@@ -87,4 +89,234 @@ TEST(Moments, same_bits_at_every_shape_and_on_the_host) {
         EXPECT_EQ(all_bits(s), want) << shape.name;
         EXPECT_EQ(s.skipped(), 2u) << shape.name;
     }
+}
+
+TEST(Moments, batches_of_one_launch_and_of_many_have_the_same_bits) {
+    const Input in = make_input(2, 19);
+    const Engine engine;
+    Moments together(engine, values, {.ratios = true}), apart(engine, values, {.ratios = true});
+    together.add(batches_of(in));
+    for (const auto& b : batches_of(in)) apart.add(b.m, b.t, b.weight);
+    EXPECT_EQ(all_bits(together), all_bits(apart));
+
+    Moments swapped(engine, values, {.ratios = true});
+    for (const auto& b : batches_of(in)) swapped.add(b.t, b.m, b.weight);
+    EXPECT_NE(all_bits(swapped), all_bits(apart)) << "planted fault: m and t swapped";
+}
+
+TEST(Moments, the_policies_agree_on_finite_input) {
+    const Input in = make_input(3, 5);
+    const Engine engine;
+    Moments skip(engine, values), propagate(engine, values, {.nonfinite = NonFinite::propagate});
+    skip.add(batches_of(in));
+    propagate.add(batches_of(in));
+    for (auto plane : {&StatePlanes::m, &StatePlanes::t, &StatePlanes::mm, &StatePlanes::tt, &StatePlanes::mt})
+        EXPECT_EQ(skip.bits(plane), propagate.bits(plane));
+    EXPECT_EQ(skip.weight(), propagate.weight());
+}
+
+namespace {
+
+/// One batch with a NaN at value 3 and an infinity at value 700.
+Input spoiled() {
+    Input in = make_input(1, 3);
+    in.m[1][3] = not_a_number;
+    in.t[2][700] = -std::numeric_limits<float>::infinity();
+    return in;
+}
+
+}  // namespace
+
+TEST(Moments, skip_leaves_a_value_as_if_the_batch_had_not_come) {
+    const Input in = spoiled();
+    const Engine engine;
+    Moments all(engine, values), without(engine, values);
+    all.add(batches_of(in));
+    without.add(in.m[0], in.t[0], in.weight[0]);
+    without.add(in.m[2], in.t[2], in.weight[2]);
+    EXPECT_EQ(all.bits(&StatePlanes::m)[3], without.bits(&StatePlanes::m)[3]);
+    EXPECT_EQ(all.bits(&StatePlanes::mt)[3], without.bits(&StatePlanes::mt)[3]);
+    EXPECT_EQ(all.bits(&StatePlanes::batches)[3], 2u);
+    EXPECT_EQ(all.bits(&StatePlanes::batches)[4], 3u);
+    EXPECT_EQ(all.skipped(), 2u);
+}
+
+TEST(Moments, propagate_keeps_a_nan_for_ever) {
+    const Engine engine;
+    Moments s(engine, values, {.nonfinite = NonFinite::propagate});
+    s.add(batches_of(spoiled()));
+    EXPECT_TRUE(std::isnan(std::bit_cast<float>(s.bits(&StatePlanes::m)[3])));
+    EXPECT_FALSE(std::isnan(std::bit_cast<float>(s.bits(&StatePlanes::m)[4])));
+    EXPECT_EQ(s.skipped(), 0u);
+}
+
+TEST(Moments, fail_refuses_the_batch_by_number_and_keeps_the_state) {
+    const Input in = spoiled();
+    const Engine engine;
+    Moments s(engine, values, {.nonfinite = NonFinite::fail});
+    s.add(in.m[0], in.t[0], 1);
+    const auto before = all_bits(s);
+    try {
+        s.add(batches_of(in));
+        FAIL();
+    } catch (const InvalidArgument& e) {
+        EXPECT_STREQ(e.what(), "batch 1: expected finite values, got 1 NaN or infinite ones");
+    }
+    EXPECT_EQ(all_bits(s), before);
+    EXPECT_EQ(s.batches(), 1u);
+}
+
+TEST(Moments, negative_input_is_counted_also_over_merges) {
+    Input in = make_input(1, 9);
+    in.m[4][10] = -1;
+    in.t[8][11] = -1;
+    in.m[8][values - 1] = -1;
+    const Engine engine;
+    Moments a(engine, values), b(engine, values);
+    a.add(batches_of(in));
+    b.add(batches_of(in));
+    EXPECT_EQ(a.negatives(), 3u);
+    a.merge(b);
+    EXPECT_EQ(a.negatives(), 6u);
+}
+
+TEST(Moments, misuse_is_refused_by_name) {
+    const Engine engine, another;
+    const std::vector<float> good(values, 1.0f), shorter(values - 1, 1.0f);
+    Moments s(engine, values);
+    const auto refused = [](auto&& call, const std::string& what) {
+        try {
+            call();
+            ADD_FAILURE() << "accepted: " << what;
+        } catch (const InvalidArgument& e) {
+            EXPECT_NE(std::string(e.what()).find(what), std::string::npos) << e.what();
+        }
+    };
+    refused([&] { Moments(engine, 0); }, "values");
+    refused([&] { s.add(good, shorter); }, "t: expected 1003 values, got 1002");
+    refused([&] { s.add(shorter, good); }, "m: expected 1003 values, got 1002");
+    for (const double weight : {0.0, -1.0, std::nan(""), std::numeric_limits<double>::infinity()})
+        refused([&] { s.add(good, good, weight); }, "weight");
+    refused([&] { s.merge(Moments(engine, values + 1)); }, "merge: expected 1003 values");
+    refused([&] { s.merge(Moments(another, values)); }, "same Engine");
+    refused([&] { s.merge(Moments(engine, values, {.ratios = true})); }, "same options");
+    refused([&] { s.add(std::span<const Batch>{}, {}); }, "batches");
+    const Batch nowhere{{nullptr, 0, values}, {nullptr, 0, values}};
+    refused([&] { s.add(std::span(&nowhere, 1), {}); }, "m: expected a device buffer, got null");
+    Moments strict(engine, values, {.nonfinite = NonFinite::fail});
+    refused([&] { strict.add(std::span(&nowhere, 1), {}); }, "NonFinite::fail");
+    EXPECT_EQ(s.batches(), 0u);
+}
+
+TEST(Moments, stands_on_the_callers_buffers) {
+    const Engine engine;
+    const std::uint64_t bytes = Moments::plane_bytes(values);
+    std::vector<Buffer> memory;
+    for (int k = 0; k < 7; ++k) memory.push_back(Buffer::zeroed(engine, bytes));
+    const StatePlanes planes{memory[0].mem(), memory[1].mem(), memory[2].mem(), memory[3].mem(),
+                             memory[4].mem(), memory[5].mem(), memory[6].mem()};
+    Moments mine(engine, values, {}, planes), own(engine, values);
+    const Input in = make_input(1, 4);
+    mine.add(batches_of(in));
+    own.add(batches_of(in));
+    EXPECT_EQ(all_bits(mine), all_bits(own));
+    EXPECT_EQ(Moments::state_bytes(values), 6 * bytes + bytes / 2);
+    std::vector<float> first(values);
+    memory[0].read(std::as_writable_bytes(std::span(first)));
+    EXPECT_EQ(std::bit_cast<std::uint32_t>(first[7]), own.bits(&StatePlanes::m)[7]);
+    EXPECT_THROW(Moments(engine, 2 * values, {}, planes), InvalidArgument);
+}
+
+namespace {
+
+/// The four inputs of the accumulation table (theory: progressive accumulation), and what two-float may lose of them.
+struct LongRun {
+    const char* name;
+    double mean_error, variance_error;  // relative; 0 variance_error: the input is constant
+    float (*draw)(Samples&);
+};
+
+const LongRun long_runs[] = {
+    {"mean 1 sd .05", 7e-12, 2e-10, [](Samples& s) { return static_cast<float>(1 + 0.05 * s.normal()); }},
+    {"lognormal mean 1 sd 1", 1e-10, 1e-9, [](Samples& s) { return static_cast<float>(s.lognormal(0.8325546)); }},
+    {"mean 100 sd .01", 1e-12, 2e-10, [](Samples& s) { return static_cast<float>(100 + 0.01 * s.normal()); }},
+    {"constant .1", 0, 0, [](Samples&) { return 0.1f; }}};
+
+struct Truth {
+    long double mean = 0, second = 0;
+};
+
+Truth truth_of(const std::vector<float>& x, std::size_t lanes, std::size_t lane) {
+    Truth t;
+    const auto n = static_cast<long double>(x.size() / lanes);
+    for (std::size_t i = lane; i < x.size(); i += lanes) t.mean += x[i];
+    t.mean /= n;
+    for (std::size_t i = lane; i < x.size(); i += lanes) t.second += (x[i] - t.mean) * (x[i] - t.mean);
+    return t;
+}
+
+double pair(const std::vector<std::uint32_t>& bits, std::size_t i) {
+    return static_cast<double>(std::bit_cast<float>(bits[i])) +
+           static_cast<double>(std::bit_cast<float>(bits[bits.size() / 2 + i]));
+}
+
+}  // namespace
+
+TEST(Moments, a_million_batches_stay_within_the_two_float_column) {
+    constexpr std::size_t lanes = 16, count = 1'000'000, per_call = 8;
+    const Engine engine;
+    for (const auto& run : long_runs) {
+        Samples draw(1);
+        const auto x = floats(lanes * count, [&] { return static_cast<double>(run.draw(draw)); });
+        const Buffer on_device = Buffer::from_host(engine, std::as_bytes(std::span(x)));
+        Moments s(engine, lanes, {.nonfinite = NonFinite::propagate});
+        for (std::size_t k = 0; k < count; k += per_call) {
+            std::vector<Batch> batches;
+            for (std::size_t b = k; b < k + per_call; ++b) {
+                const View view{on_device.mem(), b * lanes, lanes};
+                batches.push_back({view, view});
+            }
+            const Event done(s.add(batches, {}));
+            if (k % 8000 == 0) wait(done);
+        }
+        const auto mean = s.bits(&StatePlanes::m), second = s.bits(&StatePlanes::mm);
+        for (std::size_t i = 0; i < lanes; ++i) {
+            const Truth want = truth_of(x, lanes, i);
+            EXPECT_LE(std::fabs(pair(mean, i) / static_cast<double>(want.mean) - 1), run.mean_error) << run.name;
+            EXPECT_LE(std::fabs(pair(second, i) - static_cast<double>(want.second)),
+                      run.variance_error * static_cast<double>(want.second))
+                << run.name;
+        }
+    }
+}
+
+TEST(Moments, sums_in_plain_float_would_not) {
+    Samples draw(1);
+    const auto x = floats(1'000'000, [&] { return 1 + 0.05 * draw.normal(); });
+    float mean = 0;
+    for (std::size_t i = 0; i < x.size(); ++i) mean += (x[i] - mean) / static_cast<float>(i + 1);
+    EXPECT_GT(std::fabs(static_cast<double>(mean) / static_cast<double>(truth_of(x, 1, 0).mean) - 1),
+              long_runs[0].mean_error);
+}
+
+TEST(Moments, an_empty_state_is_zero_whatever_its_planes_hold) {
+    const Engine engine;
+    std::vector<Buffer> memory;
+    const std::vector<std::byte> rubbish(Moments::plane_bytes(values), std::byte{0xff});
+    for (int k = 0; k < 7; ++k) {
+        memory.emplace_back(engine, rubbish.size());
+        memory.back().write(rubbish);
+    }
+    const StatePlanes planes{memory[0].mem(), memory[1].mem(), memory[2].mem(), memory[3].mem(),
+                             memory[4].mem(), memory[5].mem(), memory[6].mem()};
+    Moments dirty(engine, values, {}, planes), clean(engine, values), filled(engine, values);
+    EXPECT_EQ(dirty.bits(&StatePlanes::m), std::vector<std::uint32_t>(2 * values, 0u));
+    filled.add(batches_of(make_input(1, 3)));
+    const auto before = all_bits(filled);
+    filled.merge(dirty);
+    EXPECT_EQ(all_bits(filled), before);
+    dirty.merge(filled);
+    EXPECT_EQ(all_bits(dirty), before);
+    clean.merge(filled);
+    EXPECT_EQ(all_bits(clean), before);
 }

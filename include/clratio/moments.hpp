@@ -56,7 +56,7 @@ struct StatePlanes {
 class Moments {
 public:
     Moments(const Engine& engine, std::uint64_t values, MomentsOptions options = {});
-    /// On the caller's buffers, of plane_bytes() each (`batches`: half of it), filled with zeros; they are retained.
+    /// On the caller's buffers, of plane_bytes() each (`batches`: half of it), of any content; they are retained.
     Moments(const Engine& engine, std::uint64_t values, MomentsOptions options, const StatePlanes& planes);
 
     static std::uint64_t plane_stride(std::uint64_t values);  ///< elements

@@ -77,14 +77,19 @@ static inline void clr_store_two(clr_two v, global float* p, ulong i, ulong stri
 
 static inline clr_two clr_two_zero(void) { return clr_two_make((clr_real)(0.0f), (clr_real)(0.0f)); }
 
-static inline clr_moments clr_load_moments(clr_planes p, ulong stride, ulong i) {
-    clr_moments s;
-    s.m = clr_load_two(p.m, i, stride);
-    s.t = clr_load_two(p.t, i, stride);
-    s.mm = clr_load_two(p.mm, i, stride);
-    s.tt = clr_load_two(p.tt, i, stride);
-    s.mt = clr_load_two(p.mt, i, stride);
-    return s;
+// A state without batches is zero, whatever its planes hold: they are never cleared.
+static inline clr_two clr_load_plane(global const float* p, clr_state s, ulong i) {
+    return s.batches == 0 ? clr_two_zero() : clr_load_two(p, i, s.stride);
+}
+
+static inline clr_moments clr_load_moments(clr_planes p, clr_state s, ulong i) {
+    clr_moments r;
+    r.m = clr_load_plane(p.m, s, i);
+    r.t = clr_load_plane(p.t, s, i);
+    r.mm = clr_load_plane(p.mm, s, i);
+    r.tt = clr_load_plane(p.tt, s, i);
+    r.mt = clr_load_plane(p.mt, s, i);
+    return r;
 }
 
 static inline void clr_store_moments(clr_moments s, clr_planes p, ulong stride, ulong i) {
@@ -100,12 +105,16 @@ static inline void clr_store_evidence(clr_two weight, clr_uint batches, clr_plan
     clr_store(clr_from_bits(batches), p.batches + i);
 }
 
-static inline clr_ratios clr_load_ratios(clr_planes p, ulong stride, ulong i) {
+static inline clr_ratios clr_load_ratios(clr_planes p, clr_state s, ulong i) {
     clr_ratios r;
-    r.quotient = clr_load_two(p.quotient, i, stride);
-    r.zero_m = clr_load_two(p.zero_m, i, stride);
-    r.zero_share = clr_load_two(p.zero_share, i, stride);
+    r.quotient = clr_load_plane(p.quotient, s, i);
+    r.zero_m = clr_load_plane(p.zero_m, s, i);
+    r.zero_share = clr_load_plane(p.zero_share, s, i);
     return r;
+}
+
+static inline clr_uint clr_load_batches(clr_planes p, clr_state s, ulong i) {
+    return s.batches == 0 ? (clr_uint)(0u) : clr_bits(clr_load(p.batches + i));
 }
 
 static inline void clr_store_ratios(clr_ratios r, clr_planes p, ulong stride, ulong i) {
@@ -116,16 +125,16 @@ static inline void clr_store_ratios(clr_ratios r, clr_planes p, ulong stride, ul
 
 static inline clr_record clr_load_record(clr_planes p, clr_state s, ulong i) {
     clr_record r;
-    r.moments = clr_load_moments(p, s.stride, i);
+    r.moments = clr_load_moments(p, s, i);
     if (s.options & CLR_STATE_PER_VALUE) {
-        r.weight = clr_load_two(p.weight, i, s.stride);
-        r.batches = clr_bits(clr_load(p.batches + i));
+        r.weight = clr_load_plane(p.weight, s, i);
+        r.batches = clr_load_batches(p, s, i);
     } else {
         r.weight = clr_two_make((clr_real)(s.weight_hi), (clr_real)(s.weight_lo));
         r.batches = (clr_uint)(s.batches);
     }
     r.ratios.quotient = r.ratios.zero_m = r.ratios.zero_share = clr_two_zero();
-    if (s.options & CLR_STATE_RATIOS) r.ratios = clr_load_ratios(p, s.stride, i);
+    if (s.options & CLR_STATE_RATIOS) r.ratios = clr_load_ratios(p, s, i);
     return r;
 }
 

@@ -57,13 +57,13 @@ CLR_FN clr_two clr_two_subtract(clr_two x, clr_two y) {
     return clr_two_quick_sum(s.hi, s.lo + (x.lo - y.lo));
 }
 
-// a - y for a plain a, as a loose pair: hi need not be the nearest float of the sum. Rounding error below 2^-47 |y|.
+// a - y for a plain a, rounding error below 2^-47 |y|.
 CLR_FN clr_two clr_two_distance(clr_real a, clr_two y) {
     const clr_two s = clr_two_difference(a, y.hi);
-    return clr_two_make(s.hi, s.lo - y.lo);
+    return clr_two_quick_sum(s.hi, s.lo - y.lo);
 }
 
-// x * y as a loose pair, rounding error below 2^-45 |x y| for pairs that are not loose.
+// x * y, rounding error below 2^-45 |x y|, as a loose pair: hi is within 2 ulp of the nearest float of the sum.
 CLR_FN clr_two clr_two_multiply(clr_two x, clr_two y) {
     const clr_two p = clr_two_product(x.hi, y.hi);
     return clr_two_make(p.hi, clr_fma(x.hi, y.lo, clr_fma(x.lo, y.hi, p.lo)));
