@@ -30,6 +30,11 @@ struct Options {
     bool fail_on_flag = false, json = false;
 
     clratio::CombineOptions combine() const { return {estimators.at(estimator), zeros.at(zero), !standard_error.empty()}; }
+    Wanted wanted() const {
+        // A missing error bar is no defect of a run that asked for none.
+        const std::uint32_t counted = ~std::uint32_t{standard_error.empty() ? CLR_FLAG_NO_ERROR_BAR : 0u};
+        return {combine(), !reference.empty(), !flags.empty(), counted};
+    }
     clratio::MomentsOptions moments() const {
         return {nonfinites.at(nonfinite), estimators.at(estimator) == Estimator::mean_of_ratios};
     }
@@ -66,7 +71,7 @@ struct Report {
     clratio::Image shape;  ///< of the first batch, without its values
     std::uint64_t batches = 0, negatives = 0;
     clratio::FlagCounts flags;
-    std::uint64_t flagged = 0;  ///< values with a flag that matters to this run, see matters()
+    std::uint64_t flagged = 0;  ///< values with a flag that matters to this run
     Seconds seconds;
     std::optional<Scores> scores;
 };
@@ -186,13 +191,12 @@ std::vector<clratio::HostBatch> batches_of(const std::vector<Pair>& pairs, const
 
 ReadOut combine_all(ImageReader& reader, const clratio::Engine& engine, const Options& options, const clratio::Tau& tau,
                     Pair&& first, Report& report) {
-    const bool with_mean = !options.reference.empty();
     Bands bands(engine, first.m.size(), report.shape.channels.size(), options.moments());
     auto pairs = next_pairs(reader, report.shape, std::move(first));
     report.batches = pairs.size();
     if (reader.left() == 0) {
         const auto batches = batches_of(pairs, options);
-        return timed(report.seconds.device, [&] { return bands.at_once(batches, tau, options.combine(), with_mean); });
+        return timed(report.seconds.device, [&] { return bands.at_once(batches, tau, options.wanted()); });
     }
     ProgressLine line;
     for (;;) {
@@ -203,19 +207,10 @@ ReadOut combine_all(ImageReader& reader, const clratio::Engine& engine, const Op
         pairs = next_pairs(reader, report.shape, next_pair(reader, &report.shape));
         report.batches += pairs.size();
     }
-    return timed(report.seconds.device, [&] { return bands.read_out(tau, options.combine(), with_mean); });
+    return timed(report.seconds.device, [&] { return bands.read_out(tau, options.wanted()); });
 }
 
 // ---- what comes out
-
-// A missing error bar is no defect of a run that asked for none.
-std::uint32_t matters(const Options& options) {
-    return options.standard_error.empty() ? ~std::uint32_t{CLR_FLAG_NO_ERROR_BAR} : ~std::uint32_t{0};
-}
-
-std::uint64_t count_flagged(const std::vector<std::uint32_t>& flags, std::uint32_t mask) {
-    return static_cast<std::uint64_t>(std::count_if(flags.begin(), flags.end(), [&](auto f) { return (f & mask) != 0; }));
-}
 
 clratio::WriteOptions settings(const Options& options, const Report& report) {
     std::string tau = options.tau.front();
@@ -345,7 +340,7 @@ int combine(const Options& options) {
     report.seconds.decode += reader.seconds();
     const auto out = clratio::combined_image(std::move(read_out.chosen), report.shape);
     report.flags = out.flags;
-    report.flagged = count_flagged(out.flag_image, matters(options));
+    report.flagged = read_out.flagged;
     report.negatives = read_out.negatives;
     if (!options.reference.empty()) {
         const auto mean = clratio::combined_image(std::move(read_out.mean), report.shape);
