@@ -1,4 +1,6 @@
 // clratio combine: batches of image pairs to one image.
+#include <unistd.h>
+
 #include <charconv>
 #include <chrono>
 #include <cmath>
@@ -14,8 +16,15 @@ namespace {
 
 using clratio::Estimator, clratio::NonFinite, clratio::Zero;
 
-constexpr std::size_t memory_budget = std::size_t{1} << 30;  // bytes of images read ahead, and of those in one launch
 constexpr std::size_t most_in_a_launch = 8;
+
+/// Bytes of images read ahead, and again of those in one launch: a quarter of the machine's memory each.
+std::size_t memory_budget() {
+    const long pages = sysconf(_SC_PHYS_PAGES), bytes = sysconf(_SC_PAGESIZE);
+    constexpr std::size_t least = std::size_t{1} << 28;
+    return pages > 0 && bytes > 0 ? std::max(least, static_cast<std::size_t>(pages) / 4 * static_cast<std::size_t>(bytes))
+                                  : least;
+}
 
 const std::map<std::string, Estimator> estimators{
     {"ratio", Estimator::ratio}, {"mean", Estimator::mean}, {"mean-of-ratios", Estimator::mean_of_ratios}};
@@ -171,7 +180,7 @@ std::vector<Pair> next_pairs(ImageReader& reader, const clratio::Image& shape, P
     std::vector<Pair> pairs;
     pairs.push_back(std::move(waiting));
     const std::size_t bytes = 2 * sizeof(float) * pairs.front().m.values.size();
-    const std::size_t most = std::clamp<std::size_t>(memory_budget / bytes, 1, most_in_a_launch);
+    const std::size_t most = std::clamp<std::size_t>(memory_budget() / bytes, 1, most_in_a_launch);
     const bool wait = 1 + reader.left() / 2 <= most;
     while (pairs.size() < most && reader.left() > 0 && (wait || reader.ready(2))) pairs.push_back(next_pair(reader, &shape));
     return pairs;
@@ -323,7 +332,8 @@ int combine(const Options& options) {
     require_folders(options);
 
     Report report;
-    ImageReader reader(interleaved(options.m, options.t), options.layer, memory_budget, std::thread::hardware_concurrency());
+    ImageReader reader(interleaved(options.m, options.t), options.layer, memory_budget(),
+                       std::thread::hardware_concurrency());
     const clratio::Engine engine = timed(report.seconds.device, [] { return clratio::Engine{}; });
     report.device = engine.info().name;
     Pair first = next_pair(reader, nullptr);
