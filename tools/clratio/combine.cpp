@@ -392,6 +392,10 @@ from the first file of --m. The output is float, ZIP, with the windows and attri
 --stderr: the standard error by the delta method; +inf with one batch. Without it a missing error bar is no flag that
 --fail-on-flag looks at.
 
+--json prints batches, pixels, channels, estimator, device, output, flags (how many values carry each; any: at least one),
+negative_inputs, seconds (decode, summed over the reading threads; device; encode) and, with --reference, rmse, bias,
+rmse_mean and bias_mean (of the plain mean), over the values that are finite in both files.
+
 Exit codes: 0 done, 1 failed, 2 usage, 3 done but values were flagged and --fail-on-flag was given.
 
 Examples:
