@@ -5,8 +5,7 @@
 #include <chrono>
 #include <cmath>
 
-#include "bands.hpp"
-#include "difference.hpp"
+#include "combine_report.hpp"
 #include "image_reader.hpp"
 #include "progress_line.hpp"
 #include "tool.hpp"
@@ -14,7 +13,8 @@
 namespace tool {
 namespace {
 
-using clratio::Estimator, clratio::NonFinite, clratio::Zero;
+using namespace combining;
+using clratio::NonFinite;
 
 constexpr std::size_t most_in_a_launch = 8;
 
@@ -25,29 +25,6 @@ std::size_t memory_budget() {
     return pages > 0 && bytes > 0 ? std::max(least, static_cast<std::size_t>(pages) / 4 * static_cast<std::size_t>(bytes))
                                   : least;
 }
-
-const std::map<std::string, Estimator> estimators{
-    {"ratio", Estimator::ratio}, {"mean", Estimator::mean}, {"mean-of-ratios", Estimator::mean_of_ratios}};
-const std::map<std::string, Zero> zeros{{"mc-mean", Zero::mc_mean}, {"zero", Zero::zero}, {"one", Zero::one}};
-const std::map<std::string, NonFinite> nonfinites{
-    {"skip", NonFinite::skip}, {"propagate", NonFinite::propagate}, {"fail", NonFinite::fail}};
-
-struct Options {
-    std::vector<std::string> m, t, tau;
-    std::string output, standard_error, flags, layer, reference;
-    std::string estimator = "ratio", zero = "mc-mean", nonfinite = "skip";
-    bool fail_on_flag = false, json = false;
-
-    clratio::CombineOptions combine() const { return {estimators.at(estimator), zeros.at(zero), !standard_error.empty()}; }
-    Wanted wanted() const {
-        // A missing error bar is no defect of a run that asked for none.
-        const std::uint32_t counted = ~std::uint32_t{standard_error.empty() ? CLR_FLAG_NO_ERROR_BAR : 0u};
-        return {combine(), !reference.empty(), !flags.empty(), counted};
-    }
-    clratio::MomentsOptions moments() const {
-        return {nonfinites.at(nonfinite), estimators.at(estimator) == Estimator::mean_of_ratios};
-    }
-};
 
 class Clock {
 public:
@@ -66,24 +43,6 @@ template <class Work> auto timed(double& seconds, Work work) {
     } add{seconds, clock};
     return work();
 }
-
-struct Seconds {
-    double decode = 0, device = 0, encode = 0;
-};
-
-struct Scores {
-    Difference estimate, mean;
-};
-
-struct Report {
-    std::string device;
-    clratio::Image shape;  ///< of the first batch, without its values
-    std::uint64_t batches = 0, negatives = 0;
-    clratio::FlagCounts flags;
-    std::uint64_t flagged = 0;  ///< values with a flag that matters to this run
-    Seconds seconds;
-    std::optional<Scores> scores;
-};
 
 // ---- tau
 
@@ -238,61 +197,6 @@ void write_all(const Options& options, const clratio::CombinedImage& out, const 
     clratio::write_image(options.output, out.estimate, with);
     if (!options.standard_error.empty()) clratio::write_image(options.standard_error, out.standard_error, with);
     if (!options.flags.empty()) clratio::write_flags(options.flags, out.estimate, out.flag_image, with);
-}
-
-Json json_of(const Options& options, const Report& r) {
-    const auto channels = r.shape.channels.size();
-    Json out{{"batches", r.batches},
-             {"pixels", static_cast<std::uint64_t>(r.shape.width()) * static_cast<std::uint64_t>(r.shape.height())},
-             {"channels", channels},
-             {"estimator", options.estimator},
-             {"device", r.device},
-             {"output", options.output},
-             {"flags",
-              {{"zero_denominator", r.flags.zero_denominator},
-               {"zero_tau", r.flags.zero_tau},
-               {"skipped", r.flags.skipped},
-               {"no_data", r.flags.no_data},
-               {"no_error_bar", r.flags.no_error_bar},
-               {"nonfinite", r.flags.nonfinite},
-               {"any", r.flags.any}}},
-             {"negative_inputs", r.negatives},
-             {"seconds", {{"decode", r.seconds.decode}, {"device", r.seconds.device}, {"encode", r.seconds.encode}}}};
-    if (r.scores) {
-        out["rmse"] = r.scores->estimate.rmse;
-        out["bias"] = r.scores->estimate.bias;
-        out["rmse_mean"] = r.scores->mean.rmse;
-        out["bias_mean"] = r.scores->mean.bias;
-    }
-    return out;
-}
-
-void print_flags(const Options& options, const Report& r) {
-    fmt::print("{} of {} values flagged\n", r.flagged,
-               static_cast<std::uint64_t>(r.shape.width()) * static_cast<std::uint64_t>(r.shape.height()) *
-                   r.shape.channels.size());
-    const auto line = [](std::uint64_t count, const char* what) {
-        if (count != 0) fmt::print("  {:>10}  {}\n", count, what);
-    };
-    line(r.flags.zero_denominator, "mean t is 0: the zero policy gave the value");
-    line(r.flags.zero_tau, "tau is 0: the impulse guard gave the value");
-    line(r.flags.skipped, "a batch was not finite and left out");
-    line(r.flags.no_data, "no finite batch: the value is 0");
-    line(options.standard_error.empty() ? 0 : r.flags.no_error_bar, "fewer than two batches: no error bar");
-    line(r.flags.nonfinite, "the estimate is not finite");
-    line(r.negatives, "negative inputs (counted only)");
-}
-
-void print_text(const Options& options, const Report& r) {
-    fmt::print("{}: {} of {} batch{}, {}x{} pixels, {} channels, on {}\n", options.output, options.estimator, r.batches,
-               r.batches == 1 ? "" : "es", r.shape.width(), r.shape.height(), r.shape.channels.size(), r.device);
-    print_flags(options, r);
-    if (r.scores) {
-        fmt::print("against {}\n  {:<15} {:>10} {:>12}\n", options.reference, "", "RMSE", "bias");
-        fmt::print("  {:<15} {:>10.6f} {:>12.6f}\n", "plain mean", r.scores->mean.rmse, r.scores->mean.bias);
-        fmt::print("  {:<15} {:>10.6f} {:>12.6f}\n", options.estimator, r.scores->estimate.rmse, r.scores->estimate.bias);
-    }
-    fmt::print("decode {:.3f} s, device {:.3f} s, encode {:.3f} s\n", r.seconds.decode, r.seconds.device, r.seconds.encode);
 }
 
 // ---- the run
