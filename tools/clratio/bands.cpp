@@ -17,10 +17,10 @@ template <class T> void append(std::vector<T>& to, const std::vector<T>& more) {
     to.insert(to.end(), more.begin(), more.end());
 }
 
-void append(Combined& to, const Combined& more) {
+void append(Combined& to, const Combined& more, bool flag_image) {
     append(to.estimate, more.estimate);
     append(to.standard_error, more.standard_error);
-    append(to.flag_image, more.flag_image);
+    if (flag_image) append(to.flag_image, more.flag_image);
     to.flags.zero_denominator += more.flags.zero_denominator;
     to.flags.zero_tau += more.flags.zero_tau;
     to.flags.skipped += more.flags.skipped;
@@ -30,10 +30,8 @@ void append(Combined& to, const Combined& more) {
     to.flags.any += more.flags.any;
 }
 
-void reserve(Combined& result, std::uint64_t values, bool standard_error) {
-    result.estimate.reserve(values);
-    result.flag_image.reserve(values);
-    if (standard_error) result.standard_error.reserve(values);
+std::uint64_t count_flagged(const std::vector<std::uint32_t>& flags, std::uint32_t counted) {
+    return static_cast<std::uint64_t>(std::count_if(flags.begin(), flags.end(), [&](auto f) { return (f & counted) != 0; }));
 }
 
 CombineOptions plain_mean(CombineOptions options) {
@@ -62,31 +60,32 @@ void Bands::add(std::span<const HostBatch> batches) {
     }
 }
 
-template <class State> ReadOut Bands::read(State state, const Tau& tau, CombineOptions options, bool with_mean) const {
+template <class State> ReadOut Bands::read(State state, const Tau& tau, const Wanted& wanted) const {
     ReadOut out;
-    reserve(out.chosen, values_, options.standard_error);
-    if (with_mean) reserve(out.mean, values_, false);
+    out.chosen.estimate.reserve(values_);
     for (std::uint64_t band = 0; band < bands(); ++band) {
         const Moments moments = state(band);
         const Tau part = slice(tau, begin(band), size(band));
-        append(out.chosen, clratio::combine(moments, part, options));
-        if (with_mean) append(out.mean, clratio::combine(moments, part, plain_mean(options)));
+        const Combined read = clratio::combine(moments, part, wanted.options);
+        append(out.chosen, read, wanted.flag_image);
+        out.flagged += count_flagged(read.flag_image, wanted.counted);
+        if (wanted.mean) append(out.mean, clratio::combine(moments, part, plain_mean(wanted.options)), false);
         out.negatives += moments.negatives();
     }
     return out;
 }
 
-ReadOut Bands::read_out(const Tau& tau, CombineOptions options, bool with_mean) const {
-    return read([&](std::uint64_t band) { return states_[band]; }, tau, options, with_mean);
+ReadOut Bands::read_out(const Tau& tau, const Wanted& wanted) const {
+    return read([&](std::uint64_t band) { return states_[band]; }, tau, wanted);
 }
 
-ReadOut Bands::at_once(std::span<const HostBatch> batches, const Tau& tau, CombineOptions options, bool with_mean) const {
+ReadOut Bands::at_once(std::span<const HostBatch> batches, const Tau& tau, const Wanted& wanted) const {
     const auto summed = [&](std::uint64_t band) {
         Moments moments = make(band);
         add_slices(moments, band, batches);
         return moments;
     };
-    return read(summed, tau, options, with_mean);
+    return read(summed, tau, wanted);
 }
 
 }  // namespace tool

@@ -10,10 +10,16 @@
 
 namespace tool {
 
+struct Wanted {
+    clratio::CombineOptions options;
+    bool mean = false;                          ///< the plain mean too
+    bool flag_image = false;                    ///< not only its counts
+    std::uint32_t counted = ~std::uint32_t{0};  ///< flags that make a value count as flagged
+};
+
 struct ReadOut {
-    clratio::Combined chosen;
-    clratio::Combined mean;  ///< the plain mean, empty unless asked for
-    std::uint64_t negatives = 0;
+    clratio::Combined chosen, mean;
+    std::uint64_t flagged = 0, negatives = 0;
 };
 
 class Bands {
@@ -22,10 +28,9 @@ public:
 
     void add(std::span<const clratio::HostBatch> batches);
     /// Of what was added.
-    ReadOut read_out(const clratio::Tau& tau, clratio::CombineOptions options, bool with_mean) const;
+    ReadOut read_out(const clratio::Tau& tau, const Wanted& wanted) const;
     /// Of these batches alone, the same bits as adding them; keeps no state.
-    ReadOut at_once(std::span<const clratio::HostBatch> batches, const clratio::Tau& tau, clratio::CombineOptions options,
-                    bool with_mean) const;
+    ReadOut at_once(std::span<const clratio::HostBatch> batches, const clratio::Tau& tau, const Wanted& wanted) const;
 
 private:
     std::uint64_t bands() const { return (values_ + band_ - 1) / band_; }
@@ -33,8 +38,7 @@ private:
     std::uint64_t size(std::uint64_t band) const { return std::min(band_, values_ - begin(band)); }
     clratio::Moments make(std::uint64_t band) const { return {engine_, size(band), options_}; }
     void add_slices(clratio::Moments& to, std::uint64_t band, std::span<const clratio::HostBatch> batches) const;
-    template <class State>
-    ReadOut read(State state, const clratio::Tau& tau, clratio::CombineOptions options, bool with_mean) const;
+    template <class State> ReadOut read(State state, const clratio::Tau& tau, const Wanted& wanted) const;
 
     clratio::Engine engine_;
     std::uint64_t values_, band_;  ///< band_: a multiple of the channels, so that each band starts with the first

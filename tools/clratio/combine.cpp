@@ -1,10 +1,11 @@
 // clratio combine: batches of image pairs to one image.
+#include <unistd.h>
+
 #include <charconv>
 #include <chrono>
 #include <cmath>
 
-#include "bands.hpp"
-#include "difference.hpp"
+#include "combine_report.hpp"
 #include "image_reader.hpp"
 #include "progress_line.hpp"
 #include "tool.hpp"
@@ -12,28 +13,18 @@
 namespace tool {
 namespace {
 
-using clratio::Estimator, clratio::NonFinite, clratio::Zero;
+using namespace combining;
+using clratio::NonFinite;
 
-constexpr std::size_t memory_budget = std::size_t{1} << 30;  // bytes of images read ahead, and of those in one launch
 constexpr std::size_t most_in_a_launch = 8;
 
-const std::map<std::string, Estimator> estimators{
-    {"ratio", Estimator::ratio}, {"mean", Estimator::mean}, {"mean-of-ratios", Estimator::mean_of_ratios}};
-const std::map<std::string, Zero> zeros{{"mc-mean", Zero::mc_mean}, {"zero", Zero::zero}, {"one", Zero::one}};
-const std::map<std::string, NonFinite> nonfinites{
-    {"skip", NonFinite::skip}, {"propagate", NonFinite::propagate}, {"fail", NonFinite::fail}};
-
-struct Options {
-    std::vector<std::string> m, t, tau;
-    std::string output, standard_error, flags, layer, reference;
-    std::string estimator = "ratio", zero = "mc-mean", nonfinite = "skip";
-    bool fail_on_flag = false, json = false;
-
-    clratio::CombineOptions combine() const { return {estimators.at(estimator), zeros.at(zero), !standard_error.empty()}; }
-    clratio::MomentsOptions moments() const {
-        return {nonfinites.at(nonfinite), estimators.at(estimator) == Estimator::mean_of_ratios};
-    }
-};
+/// Bytes of images read ahead, and again of those in one launch: a quarter of the machine's memory each.
+std::size_t memory_budget() {
+    const long pages = sysconf(_SC_PHYS_PAGES), bytes = sysconf(_SC_PAGESIZE);
+    constexpr std::size_t least = std::size_t{1} << 28;
+    return pages > 0 && bytes > 0 ? std::max(least, static_cast<std::size_t>(pages) / 4 * static_cast<std::size_t>(bytes))
+                                  : least;
+}
 
 class Clock {
 public:
@@ -52,24 +43,6 @@ template <class Work> auto timed(double& seconds, Work work) {
     } add{seconds, clock};
     return work();
 }
-
-struct Seconds {
-    double decode = 0, device = 0, encode = 0;
-};
-
-struct Scores {
-    Difference estimate, mean;
-};
-
-struct Report {
-    std::string device;
-    clratio::Image shape;  ///< of the first batch, without its values
-    std::uint64_t batches = 0, negatives = 0;
-    clratio::FlagCounts flags;
-    std::uint64_t flagged = 0;  ///< values with a flag that matters to this run, see matters()
-    Seconds seconds;
-    std::optional<Scores> scores;
-};
 
 // ---- tau
 
@@ -166,7 +139,7 @@ std::vector<Pair> next_pairs(ImageReader& reader, const clratio::Image& shape, P
     std::vector<Pair> pairs;
     pairs.push_back(std::move(waiting));
     const std::size_t bytes = 2 * sizeof(float) * pairs.front().m.values.size();
-    const std::size_t most = std::clamp<std::size_t>(memory_budget / bytes, 1, most_in_a_launch);
+    const std::size_t most = std::clamp<std::size_t>(memory_budget() / bytes, 1, most_in_a_launch);
     const bool wait = 1 + reader.left() / 2 <= most;
     while (pairs.size() < most && reader.left() > 0 && (wait || reader.ready(2))) pairs.push_back(next_pair(reader, &shape));
     return pairs;
@@ -186,13 +159,12 @@ std::vector<clratio::HostBatch> batches_of(const std::vector<Pair>& pairs, const
 
 ReadOut combine_all(ImageReader& reader, const clratio::Engine& engine, const Options& options, const clratio::Tau& tau,
                     Pair&& first, Report& report) {
-    const bool with_mean = !options.reference.empty();
     Bands bands(engine, first.m.size(), report.shape.channels.size(), options.moments());
     auto pairs = next_pairs(reader, report.shape, std::move(first));
     report.batches = pairs.size();
     if (reader.left() == 0) {
         const auto batches = batches_of(pairs, options);
-        return timed(report.seconds.device, [&] { return bands.at_once(batches, tau, options.combine(), with_mean); });
+        return timed(report.seconds.device, [&] { return bands.at_once(batches, tau, options.wanted()); });
     }
     ProgressLine line;
     for (;;) {
@@ -203,19 +175,10 @@ ReadOut combine_all(ImageReader& reader, const clratio::Engine& engine, const Op
         pairs = next_pairs(reader, report.shape, next_pair(reader, &report.shape));
         report.batches += pairs.size();
     }
-    return timed(report.seconds.device, [&] { return bands.read_out(tau, options.combine(), with_mean); });
+    return timed(report.seconds.device, [&] { return bands.read_out(tau, options.wanted()); });
 }
 
 // ---- what comes out
-
-// A missing error bar is no defect of a run that asked for none.
-std::uint32_t matters(const Options& options) {
-    return options.standard_error.empty() ? ~std::uint32_t{CLR_FLAG_NO_ERROR_BAR} : ~std::uint32_t{0};
-}
-
-std::uint64_t count_flagged(const std::vector<std::uint32_t>& flags, std::uint32_t mask) {
-    return static_cast<std::uint64_t>(std::count_if(flags.begin(), flags.end(), [&](auto f) { return (f & mask) != 0; }));
-}
 
 clratio::WriteOptions settings(const Options& options, const Report& report) {
     std::string tau = options.tau.front();
@@ -234,61 +197,6 @@ void write_all(const Options& options, const clratio::CombinedImage& out, const 
     clratio::write_image(options.output, out.estimate, with);
     if (!options.standard_error.empty()) clratio::write_image(options.standard_error, out.standard_error, with);
     if (!options.flags.empty()) clratio::write_flags(options.flags, out.estimate, out.flag_image, with);
-}
-
-Json json_of(const Options& options, const Report& r) {
-    const auto channels = r.shape.channels.size();
-    Json out{{"batches", r.batches},
-             {"pixels", static_cast<std::uint64_t>(r.shape.width()) * static_cast<std::uint64_t>(r.shape.height())},
-             {"channels", channels},
-             {"estimator", options.estimator},
-             {"device", r.device},
-             {"output", options.output},
-             {"flags",
-              {{"zero_denominator", r.flags.zero_denominator},
-               {"zero_tau", r.flags.zero_tau},
-               {"skipped", r.flags.skipped},
-               {"no_data", r.flags.no_data},
-               {"no_error_bar", r.flags.no_error_bar},
-               {"nonfinite", r.flags.nonfinite},
-               {"any", r.flags.any}}},
-             {"negative_inputs", r.negatives},
-             {"seconds", {{"decode", r.seconds.decode}, {"device", r.seconds.device}, {"encode", r.seconds.encode}}}};
-    if (r.scores) {
-        out["rmse"] = r.scores->estimate.rmse;
-        out["bias"] = r.scores->estimate.bias;
-        out["rmse_mean"] = r.scores->mean.rmse;
-        out["bias_mean"] = r.scores->mean.bias;
-    }
-    return out;
-}
-
-void print_flags(const Options& options, const Report& r) {
-    fmt::print("{} of {} values flagged\n", r.flagged,
-               static_cast<std::uint64_t>(r.shape.width()) * static_cast<std::uint64_t>(r.shape.height()) *
-                   r.shape.channels.size());
-    const auto line = [](std::uint64_t count, const char* what) {
-        if (count != 0) fmt::print("  {:>10}  {}\n", count, what);
-    };
-    line(r.flags.zero_denominator, "mean t is 0: the zero policy gave the value");
-    line(r.flags.zero_tau, "tau is 0: the impulse guard gave the value");
-    line(r.flags.skipped, "a batch was not finite and left out");
-    line(r.flags.no_data, "no finite batch: the value is 0");
-    line(options.standard_error.empty() ? 0 : r.flags.no_error_bar, "fewer than two batches: no error bar");
-    line(r.flags.nonfinite, "the estimate is not finite");
-    line(r.negatives, "negative inputs (counted only)");
-}
-
-void print_text(const Options& options, const Report& r) {
-    fmt::print("{}: {} of {} batch{}, {}x{} pixels, {} channels, on {}\n", options.output, options.estimator, r.batches,
-               r.batches == 1 ? "" : "es", r.shape.width(), r.shape.height(), r.shape.channels.size(), r.device);
-    print_flags(options, r);
-    if (r.scores) {
-        fmt::print("against {}\n  {:<15} {:>10} {:>12}\n", options.reference, "", "RMSE", "bias");
-        fmt::print("  {:<15} {:>10.6f} {:>12.6f}\n", "plain mean", r.scores->mean.rmse, r.scores->mean.bias);
-        fmt::print("  {:<15} {:>10.6f} {:>12.6f}\n", options.estimator, r.scores->estimate.rmse, r.scores->estimate.bias);
-    }
-    fmt::print("decode {:.3f} s, device {:.3f} s, encode {:.3f} s\n", r.seconds.decode, r.seconds.device, r.seconds.encode);
 }
 
 // ---- the run
@@ -328,7 +236,8 @@ int combine(const Options& options) {
     require_folders(options);
 
     Report report;
-    ImageReader reader(interleaved(options.m, options.t), options.layer, memory_budget, std::thread::hardware_concurrency());
+    ImageReader reader(interleaved(options.m, options.t), options.layer, memory_budget(),
+                       std::thread::hardware_concurrency());
     const clratio::Engine engine = timed(report.seconds.device, [] { return clratio::Engine{}; });
     report.device = engine.info().name;
     Pair first = next_pair(reader, nullptr);
@@ -345,7 +254,7 @@ int combine(const Options& options) {
     report.seconds.decode += reader.seconds();
     const auto out = clratio::combined_image(std::move(read_out.chosen), report.shape);
     report.flags = out.flags;
-    report.flagged = count_flagged(out.flag_image, matters(options));
+    report.flagged = read_out.flagged;
     report.negatives = read_out.negatives;
     if (!options.reference.empty()) {
         const auto mean = clratio::combined_image(std::move(read_out.mean), report.shape);
@@ -386,6 +295,10 @@ from the first file of --m. The output is float, ZIP, with the windows and attri
 --flags: a UINT for each value; 1 mean t is 0, 2 tau is 0, 4 batch skipped, 8 no data, 16 no error bar, 32 not finite.
 --stderr: the standard error by the delta method; +inf with one batch. Without it a missing error bar is no flag that
 --fail-on-flag looks at.
+
+--json prints batches, pixels, channels, estimator, device, output, flags (how many values carry each; any: at least one),
+negative_inputs, seconds (decode, summed over the reading threads; device; encode) and, with --reference, rmse, bias,
+rmse_mean and bias_mean (of the plain mean), over the values that are finite in both files.
 
 Exit codes: 0 done, 1 failed, 2 usage, 3 done but values were flagged and --fail-on-flag was given.
 

@@ -1,0 +1,441 @@
+// The command line, run as a user runs it.
+#include <ImfStringAttribute.h>
+#include <gtest/gtest.h>
+#include <png.h>
+
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "clratio/image.hpp"
+#include "support/exr.hpp"
+#include "support/run.hpp"
+#include "support/scratch.hpp"
+
+using namespace clratio;
+using nlohmann::json;
+using support::Said;
+using support::Scratch;
+
+namespace {
+
+const std::string cycles = CLRATIO_TEST_DATA "/cycles/";
+
+using Words = std::vector<std::string>;
+
+Words operator+(Words a, const Words& b) {
+    a.insert(a.end(), b.begin(), b.end());
+    return a;
+}
+
+Said clratio_tool(const Words& words, const support::Surroundings& around = {}) {
+    return support::run(CLRATIO_TOOL, words, around);
+}
+
+Words files(const std::string& scene, const char* kind, int count) {
+    Words all;
+    for (int k = 0; k < count; ++k) all.push_back(cycles + scene + "/" + kind + "_00" + std::to_string(k % 8) + ".exr");
+    return all;
+}
+
+Words pairs(const std::string& scene, int count) {
+    return Words{"combine", "--m"} + files(scene, "m", count) + Words{"--t"} + files(scene, "t", count);
+}
+
+std::string reference(const std::string& scene, const char* kind) { return cycles + scene + "/" + kind + "_ref.exr"; }
+
+/// Combines and returns the JSON; nothing may stand on stderr.
+json combined(const Words& words) {
+    const Said said = clratio_tool(words + Words{"--json"});
+    EXPECT_EQ(said.code, 0) << said.err;
+    EXPECT_EQ(said.err, "");
+    return json::parse(said.out, nullptr, false);
+}
+
+void expect_in(const std::string& part, const std::string& text) {
+    EXPECT_NE(text.find(part), std::string::npos) << "'" << part << "' is not in: " << text;
+}
+
+/// The named exit code, `part` in one line on stderr, nothing on stdout.
+void expect_refused(const Words& words, int code, const std::string& part, const support::Surroundings& around = {}) {
+    const Said said = clratio_tool(words, around);
+    EXPECT_EQ(said.code, code) << said.err;
+    EXPECT_EQ(said.out, "");
+    expect_in(part, said.err);
+    EXPECT_EQ(std::count(said.err.begin(), said.err.end(), '\n'), 1) << said.err;
+    EXPECT_EQ(said.err.rfind("clratio: ", 0), 0u) << said.err;
+}
+
+Image made(int width, int height, float value) {
+    Image image;
+    image.channels = {"R", "G", "B"};
+    image.data_window = image.display_window = {0, 0, width - 1, height - 1};
+    image.values.assign(3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height), value);
+    return image;
+}
+
+// The value that eq. (10) gives in double for the means of the files; zero denominators give 0.
+std::vector<double> ratio_in_double(const Words& m, const Words& t, const Image& tau) {
+    std::vector<double> sum_m(tau.size()), sum_t(tau.size());
+    for (std::size_t k = 0; k < m.size(); ++k) {
+        const Image a = read_image(m[k]), b = read_image(t[k]);
+        for (std::size_t i = 0; i < tau.size(); ++i) {
+            sum_m[i] += a.values[i];
+            sum_t[i] += b.values[i];
+        }
+    }
+    const auto n = static_cast<double>(m.size());
+    for (std::size_t i = 0; i < tau.size(); ++i) {
+        const double impulse = tau.values[i] == 0;
+        const double denominator = sum_t[i] / n + impulse;
+        sum_m[i] = denominator == 0 ? 0 : (tau.values[i] + impulse) * (sum_m[i] / n) / denominator;
+    }
+    return sum_m;
+}
+
+struct Row {
+    int batches;
+    double mean, ratio, mean_of_ratios;
+};
+const std::map<std::string, std::vector<Row>> tables{
+    {"area",
+     {{1, .02194, .01772, .01772}, {2, .01594, .01256, .01288}, {4, .01189, .00898, .00946}, {8, .00937, .00645, .00700}}},
+    {"volume",
+     {{1, .17570, .13063, .13063}, {2, .12410, .08602, .10699}, {4, .08969, .04906, .09316}, {8, .06483, .02661, .08532}}}};
+
+json scene_scores(const std::string& scene, int batches, const Words& more) {
+    const Scratch scratch;
+    return combined(pairs(scene, batches) +
+                    Words{"--tau", reference(scene, "t"), "--reference", reference(scene, "m"), "-o", scratch / "o.exr"} +
+                    more);
+}
+
+}  // namespace
+
+TEST(Tool, rmse_of_the_real_renders_is_as_published) {
+    for (const auto& [scene, rows] : tables)
+        for (const Row& row : rows) {
+            SCOPED_TRACE(scene + " " + std::to_string(row.batches));
+            const json ratio = scene_scores(scene, row.batches, {"--zero", "zero"});
+            EXPECT_NEAR(ratio["rmse"], row.ratio, 1e-5);
+            EXPECT_NEAR(ratio["rmse_mean"], row.mean, 1e-5);
+            const json mean = scene_scores(scene, row.batches, {"--zero", "zero", "--estimator", "mean-of-ratios"});
+            EXPECT_NEAR(mean["rmse"], row.mean_of_ratios, 1e-5);
+        }
+}
+
+TEST(Tool, the_published_table_sees_another_policy) {
+    EXPECT_GT(std::fabs(scene_scores("volume", 8, {"--zero", "one"})["rmse"].get<double>() - .02661), 1e-4);
+}
+
+TEST(Tool, more_batches_than_a_launch_takes) {
+    const Scratch scratch;
+    const json once = scene_scores("volume", 8, {"--zero", "zero"}), twice = scene_scores("volume", 16, {"--zero", "zero"});
+    EXPECT_EQ(twice["batches"], 16);
+    EXPECT_NEAR(twice["rmse"], once["rmse"].get<double>(), 1e-7);
+}
+
+TEST(Tool, json_has_every_field) {
+    const json j = scene_scores("volume", 2, {});
+    EXPECT_EQ(j["batches"], 2);
+    EXPECT_EQ(j["pixels"], 30000);
+    EXPECT_EQ(j["channels"], 3);
+    EXPECT_EQ(j["estimator"], "ratio");
+    EXPECT_EQ(j["device"], Engine{}.info().name);
+    for (const char* name : {"zero_denominator", "zero_tau", "skipped", "no_data", "no_error_bar", "nonfinite", "any"})
+        EXPECT_TRUE(j["flags"][name].is_number_unsigned()) << name;
+    for (const char* name : {"decode", "device", "encode"}) EXPECT_TRUE(j["seconds"][name].is_number_float()) << name;
+    for (const char* name : {"rmse", "bias", "rmse_mean", "bias_mean"}) EXPECT_TRUE(j[name].is_number_float()) << name;
+    const Scratch scratch;
+    EXPECT_FALSE(combined(pairs("area", 1) + Words{"--tau", "1", "-o", scratch / "o.exr"}).contains("rmse"));
+}
+
+TEST(Tool, the_multilayer_pair_combines_without_conversion) {
+    const Scratch scratch;
+    const std::string out = scratch / "o.exr", tau = reference("multilayer", "t");
+    combined(pairs("multilayer", 2) + Words{"--tau", tau, "--zero", "zero", "-o", out});
+    const Image image = read_image(out), first = read_image(files("multilayer", "m", 1)[0]);
+    const auto want = ratio_in_double(files("multilayer", "m", 2), files("multilayer", "t", 2), read_image(tau));
+    double worst = 0;
+    for (std::size_t i = 0; i < want.size(); ++i)
+        worst = std::max(worst, std::fabs(image.values[i] - want[i]) / std::max(1e-30, std::fabs(want[i])));
+    EXPECT_LE(worst, 3 * std::ldexp(1, -24)) << "two means and a quotient, then the product with tau: 3 roundings";
+    EXPECT_EQ(image.channels, first.channels);
+    EXPECT_EQ(image.alpha, first.alpha) << "alpha is carried from the first batch";
+    EXPECT_EQ(image.data_window, first.data_window);
+}
+
+TEST(Tool, layers_are_named_for_one_file_or_for_all) {
+    const Scratch scratch;
+    const Words layers{"a.B", "a.G", "a.R", "b.B", "b.G", "b.R"};
+    support::write_exr(scratch / "x.exr", {{.channels = layers}});
+    const std::string x = scratch / "x.exr", out = scratch / "o.exr";
+    expect_refused({"combine", "--m", x, "--t", x, "--tau", "1", "-o", out}, 1, x + ": several layers and none named");
+    combined({"combine", "--m", x, "--t", x + ":b", "--tau", x, "-o", out, "--layer", "a"});
+    expect_refused({"combine", "--m", x, "--t", x, "--tau", x + ":c", "-o", out, "--layer", "a"}, 1,
+                   x + ":c: no such layer");
+}
+
+TEST(Tool, writes_settings_and_metadata) {
+    const Scratch scratch;
+    combined(pairs("area", 2) +
+             Words{"--tau", "1", "2", "3", "--zero", "one", "--nonfinite", "propagate", "-o", scratch / "o.exr"});
+    Imf::MultiPartInputFile file((scratch / "o.exr").c_str());
+    const auto text = [&](const char* name) { return file.header(0).typedAttribute<Imf::StringAttribute>(name).value(); };
+    EXPECT_EQ(text("clratio/estimator"), "ratio");
+    EXPECT_EQ(text("clratio/zero"), "one");
+    EXPECT_EQ(text("clratio/nonfinite"), "propagate");
+    EXPECT_EQ(text("clratio/batches"), "2");
+    EXPECT_EQ(text("clratio/tau"), "1 2 3");
+    EXPECT_EQ(text("Camera"), "Camera");
+}
+
+TEST(Tool, tau_is_a_number_one_a_channel_or_the_mean_of_files) {
+    const Scratch scratch;
+    Image m = made(5, 4, 3), t = made(5, 4, 2);
+    write_image(scratch / "m.exr", m);
+    write_image(scratch / "t.exr", t);
+    write_image(scratch / "1.exr", made(5, 4, 1));
+    write_image(scratch / "4.exr", made(5, 4, 4));
+    const auto first_pixel = [&](const Words& tau) {
+        combined(Words{"combine", "--m", scratch / "m.exr", "--t", scratch / "t.exr", "-o", scratch / "o.exr", "--tau"} +
+                 tau);
+        const Image image = read_image(scratch / "o.exr");
+        return std::vector<float>(image.values.begin(), image.values.begin() + 3);
+    };
+    EXPECT_EQ(first_pixel({"2"}), (std::vector<float>{3, 3, 3}));
+    EXPECT_EQ(first_pixel({"1", "2", "4"}), (std::vector<float>{1.5, 3, 6}));
+    EXPECT_EQ(first_pixel({scratch / "1.exr", scratch / "4.exr"}), (std::vector<float>{3.75, 3.75, 3.75}));
+}
+
+TEST(Tool, several_bands_give_the_bits_of_one) {
+    const Scratch scratch;
+    std::vector<Image> images(4, made(631, 401, 0));  // more than 2^19 values, in bands of another length
+    std::uint32_t r = 1;
+    for (auto& image : images)
+        for (float& v : image.values) v = static_cast<float>((r = r * 747796405u + 2891336453u) >> 8) * 0x1p-24f;
+    for (std::size_t i = 0; i < images.size(); ++i) write_image(scratch / (std::to_string(i) + ".exr"), images[i]);
+    const auto file = [&](int i) { return scratch / (std::to_string(i) + ".exr"); };
+    Moments sum{Engine{}, images[0].size()};
+    for (int k = 0; k < 10; ++k) sum.add(images[k % 2], images[2 + k % 2]);
+    const auto want = combine(sum, Tau(std::vector<float>{1, 2, 3}));
+    Words words{"combine", "--tau", "1", "2", "3", "-o", scratch / "o.exr", "--flags", scratch / "f.exr", "--m"};
+    for (int k = 0; k < 10; ++k) words.push_back(file(k % 2));
+    words.push_back("--t");
+    for (int k = 0; k < 10; ++k) words.push_back(file(2 + k % 2));
+    const json j = combined(words);
+    EXPECT_EQ(read_image(scratch / "o.exr").values, want.estimate);
+    EXPECT_EQ(j["flags"]["any"], want.flags.any);
+
+    Moments two{Engine{}, images[0].size()};
+    for (int k = 0; k < 2; ++k) two.add(images[k], images[2 + k]);
+    combined({"combine", "--tau", "1", "2", "3", "-o", scratch / "o.exr", "--m", file(0), file(1), "--t", file(2), file(3)});
+    EXPECT_EQ(read_image(scratch / "o.exr").values, combine(two, Tau(std::vector<float>{1, 2, 3})).estimate);
+}
+
+TEST(Tool, zero_denominators_follow_the_policy_are_flagged_and_can_fail_the_run) {
+    const Scratch scratch;
+    Image t = made(5, 4, 2);
+    t.values[7] = 0;
+    write_image(scratch / "m.exr", made(5, 4, 3));
+    write_image(scratch / "t.exr", t);
+    const Words words{"combine", "--m", scratch / "m.exr", "--t", scratch / "t.exr", "--tau", "4", "-o", scratch / "o.exr"};
+    for (const auto& [policy, value] : std::map<std::string, float>{{"mc-mean", 3}, {"zero", 0}, {"one", 4}}) {
+        const json j = combined(words + Words{"--zero", policy, "--flags", scratch / "f.exr"});
+        EXPECT_EQ(j["flags"]["zero_denominator"], 1);
+        const Image out = read_image(scratch / "o.exr"), flags = read_image(scratch / "f.exr");
+        EXPECT_EQ(out.values[7], value);
+        EXPECT_EQ(out.values[6], 6);
+        EXPECT_EQ(static_cast<unsigned>(flags.values[7]) & CLR_FLAG_ZERO_DENOMINATOR, CLR_FLAG_ZERO_DENOMINATOR);
+        EXPECT_EQ(static_cast<unsigned>(flags.values[6]) & CLR_FLAG_ZERO_DENOMINATOR, 0u);
+    }
+    std::filesystem::remove(scratch / "o.exr");
+    EXPECT_EQ(clratio_tool(words + Words{"--fail-on-flag"}).code, 3);
+    EXPECT_TRUE(std::filesystem::exists(scratch / "o.exr")) << "flagged, but written";
+    const Words clean{"combine", "--m", scratch / "m.exr", "--t",           scratch / "m.exr", "--tau",
+                      "4",       "-o",  scratch / "o.exr", "--fail-on-flag"};
+    EXPECT_EQ(clratio_tool(clean).code, 0);
+    EXPECT_EQ(clratio_tool(clean + Words{"--stderr", scratch / "e.exr"}).code, 3) << "one batch has no error bar";
+    EXPECT_EQ(read_image(scratch / "e.exr").values[0], std::numeric_limits<float>::infinity());
+}
+
+TEST(Tool, nonfinite_inputs_follow_the_policy) {
+    const Scratch scratch;
+    Image bad = made(5, 4, 3);
+    bad.values[3 * 7 + 1] = std::numeric_limits<float>::quiet_NaN();
+    write_image(scratch / "bad.exr", bad);
+    write_image(scratch / "m.exr", made(5, 4, 3));
+    write_image(scratch / "t.exr", made(5, 4, 2));
+    const Words words{
+        "combine", "--m", scratch / "bad.exr", scratch / "m.exr", "--t", scratch / "t.exr", scratch / "t.exr", "--tau",
+        "4",       "-o",  scratch / "o.exr"};
+    EXPECT_EQ(combined(words)["flags"]["skipped"], 1);
+    EXPECT_EQ(read_image(scratch / "o.exr").values[22], 6);
+    EXPECT_EQ(combined(words + Words{"--nonfinite", "propagate"})["flags"]["nonfinite"], 1);
+    EXPECT_TRUE(std::isnan(read_image(scratch / "o.exr").values[22]));
+    std::filesystem::remove(scratch / "o.exr");
+    expect_refused(words + Words{"--nonfinite", "fail"}, 1, scratch / "bad.exr" + ": nan at column 2, row 1, channel G");
+    EXPECT_FALSE(std::filesystem::exists(scratch / "o.exr"));
+}
+
+TEST(Tool, usage_errors_exit_2) {
+    const Words pair{"combine", "--m", "m.exr", "--t", "t.exr"};
+    expect_refused({}, 2, "a subcommand is needed");
+    expect_refused({"frob"}, 2, "frob");
+    expect_refused({"combine"}, 2, "--m is required");
+    expect_refused(pair + Words{"-o", "o.exr"}, 2, "--tau is required");
+    expect_refused({"combine", "--m", "a", "b", "--t", "c", "--tau", "1", "-o", "o.exr"}, 2,
+                   "--m has 2 files and --t has 1");
+    expect_refused(pair + Words{"--tau", "nan", "-o", "o.exr"}, 2, "--tau: expected a finite number, got nan");
+    expect_refused(pair + Words{"--tau", "inf", "-o", "o.exr"}, 2, "got inf");
+    expect_refused(pair + Words{"--tau", "1e999", "-o", "o.exr"}, 2, "got 1e999");
+    expect_refused(pair + Words{"--tau", "1", "a.exr", "-o", "o.exr"}, 2, "either numbers or files");
+    expect_refused(pair + Words{"--tau", "1", "-o", "o.exr", "--zero", "two"}, 2, "two");
+    expect_refused(pair + Words{"--tau", "1", "-o", "o.exr", "--flags", "o.exr"}, 2, "o.exr: named for two outputs");
+    expect_refused(pair + Words{"--tau", "1", "-o", "o.exr", "--estimator", "mean-of-ratios", "--stderr", "e.exr"}, 2,
+                   "--stderr");
+    const Scratch scratch;
+    expect_refused(pairs("area", 1) + Words{"--tau", "1", "2", "-o", scratch / "o.exr"}, 2,
+                   "2 numbers for the 3 channels of " + files("area", "m", 1)[0]);
+}
+
+TEST(Tool, errors_exit_1_and_name_the_file) {
+    const Scratch scratch;
+    const std::string out = scratch / "o.exr", none = scratch / "none.exr", text = scratch / "text.exr",
+                      small = scratch / "small.exr";
+    const std::string m = files("area", "m", 1)[0], t = files("area", "t", 1)[0];
+    support::put_bytes(text, "text");
+    write_image(small, made(5, 4, 1));
+    const auto refused = [&](const std::string& m_file, const std::string& t_file, const std::string& tau,
+                             const std::string& part) {
+        expect_refused({"combine", "--m", m_file, "--t", t_file, "--tau", tau, "-o", out}, 1, part);
+        EXPECT_FALSE(std::filesystem::exists(out));
+    };
+    refused(none, t, "1", none + ": no such file");
+    refused(m, none, "1", none + ": no such file");
+    refused(m, t, none, none + ": no such file");
+    refused(m, text, "1", text);
+    refused(m, small, "1", small);
+    refused(m, small, "1", m);
+    refused(m, t, small, small);
+    support::put_bytes(scratch / "cut.exr", support::bytes_of(m).substr(0, 90000));
+    refused(scratch / "cut.exr", t, "1", scratch / "cut.exr");
+    const Words good{"combine", "--m", m, "--t", t, "--tau", "1"};
+    expect_refused(good + Words{"-o", scratch / "no/o.exr"}, 1, scratch / "no/o.exr");
+    expect_refused(good + Words{"-o", "/dev/null"}, 1, "/dev/null: cannot be written: exists and is not a regular file");
+    expect_refused(good + Words{"-o", out, "--reference", none}, 1, none);
+    expect_refused(good + Words{"-o", out, "--reference", small}, 1, small);
+    expect_refused({"compare", m, small}, 1, small);
+    expect_refused({"compare", none, m}, 1, none);
+    expect_refused({"picture", none, "-o", scratch / "p.png"}, 1, none);
+    expect_refused({"picture", m, "-o", scratch / "no/p.png"}, 1, scratch / "no/p.png");
+}
+
+TEST(Tool, a_full_disk_exits_1_and_keeps_the_old_file) {
+    const Scratch scratch;
+    const std::string out = scratch / "o.exr";
+    const Words words = pairs("area", 1) + Words{"--tau", "1", "-o", out};
+    combined(words);
+    const std::string old = support::bytes_of(out);
+    expect_refused(words, 1, out + ": cannot be written: File too large", {.file_size_limit = old.size() - 1});
+    EXPECT_EQ(support::bytes_of(out), old);
+    EXPECT_EQ(scratch.files(), 1u);
+}
+
+TEST(Tool, a_full_standard_output_exits_1) {
+    const Said said = clratio_tool({"compare", reference("area", "m"), reference("area", "m")}, {.out = "/dev/full"});
+    EXPECT_EQ(said.code, 1);
+    expect_in("standard output", said.err);
+}
+
+TEST(Tool, compare_computes_what_it_says) {
+    const Scratch scratch;
+    Image a = made(4, 1, 1), r = made(4, 1, 1);
+    a.values = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, std::numeric_limits<float>::infinity(), 1};
+    r.values = {1, 1, 1, 2, 2, 2, 4, 4, 4, 8, 8, std::numeric_limits<float>::quiet_NaN()};
+    write_image(scratch / "a.exr", a);
+    write_image(scratch / "r.exr", r);
+    const Said said = clratio_tool({"compare", scratch / "a.exr", scratch / "r.exr", "--json"});
+    ASSERT_EQ(said.code, 0) << said.err;
+    const json j = json::parse(said.out);
+    EXPECT_EQ(j["values"], 12);
+    EXPECT_EQ(j["compared"], 10);
+    EXPECT_EQ(j["nonfinite"], 1);
+    EXPECT_EQ(j["nonfinite_reference"], 1);
+    EXPECT_EQ(j["relative_mse_epsilon"], .01);
+    double sum = 0, squares = 0, absolute = 0, relative = 0;
+    for (std::size_t i = 0; i < 10; ++i) {
+        const double e = a.values[i] - r.values[i], s = r.values[i];
+        sum += e / 10;
+        squares += e * e / 10;
+        absolute += std::fabs(e) / 10;
+        relative += e * e / (s * s + .01) / 10;
+    }
+    EXPECT_NEAR(j["bias"], sum, 1e-12);
+    EXPECT_NEAR(j["rmse"], std::sqrt(squares), 1e-12);
+    EXPECT_NEAR(j["mae"], absolute, 1e-12);
+    EXPECT_NEAR(j["relative_mse"], relative, 1e-12);
+    expect_in("mean((a - r)^2 / (r^2 + epsilon)), epsilon = 0.01",
+              clratio_tool({"compare", scratch / "a.exr", scratch / "r.exr"}).out);
+}
+
+TEST(Tool, devices_says_which_and_why) {
+    const Said said = clratio_tool({"devices", "--json", "--self-test"}, {.environment = {{"CLRATIO_DEVICE", "cpu"}}});
+    ASSERT_EQ(said.code, 0) << said.err;
+    const json j = json::parse(said.out);
+    EXPECT_EQ(j["reason"], "CLRATIO_DEVICE=cpu");
+    EXPECT_EQ(j["devices"].size(), list_devices().size());
+    EXPECT_TRUE(j["self_test"]);
+    expect_in("would be picked: CLRATIO_DEVICE=cpu",
+              clratio_tool({"devices"}, {.environment = {{"CLRATIO_DEVICE", "cpu"}}}).out);
+    expect_refused({"devices"}, 1, "abacus", {.environment = {{"CLRATIO_DEVICE", "abacus"}}});
+}
+
+TEST(Tool, without_a_platform_it_names_the_package_and_the_folder) {
+    for (const Words& words : {Words{"devices"}, pairs("area", 1) + Words{"--tau", "1", "-o", "never.exr"}}) {
+        expect_refused(words, 1, "pocl-opencl-icd", {.environment = {{"OCL_ICD_VENDORS", "/nowhere"}}});
+        expect_refused(words, 1, "/etc/OpenCL/vendors", {.environment = {{"OCL_ICD_VENDORS", "/nowhere"}}});
+    }
+}
+
+TEST(Tool, help_documents_the_exit_codes) {
+    for (const Words& words : {Words{"--help"}, Words{"combine", "--help"}}) {
+        const Said said = clratio_tool(words);
+        EXPECT_EQ(said.code, 0);
+        EXPECT_EQ(said.err, "");
+        expect_in("Exit codes", said.out);
+        expect_in("--fail-on-flag", said.out);
+    }
+}
+
+TEST(Tool, picture_draws_srgb_side_by_side) {
+    const Scratch scratch;
+    Image half_grey = made(20, 10, .5f);
+    half_grey.values[0] = std::numeric_limits<float>::quiet_NaN();
+    write_image(scratch / "a.exr", half_grey);
+    write_image(scratch / "b.exr", made(20, 10, .125f));
+    const auto draw = [&](const Words& more) {
+        const Said said =
+            clratio_tool(Words{"picture", scratch / "a.exr", scratch / "b.exr", "-o", scratch / "p.png"} + more);
+        EXPECT_EQ(said.code, 0) << said.err;
+        png_image png{};
+        png.version = PNG_IMAGE_VERSION;
+        EXPECT_TRUE(png_image_begin_read_from_file(&png, (scratch / "p.png").c_str()));
+        png.format = PNG_FORMAT_RGB;
+        std::vector<int> size{static_cast<int>(png.width), static_cast<int>(png.height)};
+        std::vector<std::uint8_t> bytes(PNG_IMAGE_SIZE(png));
+        png_image_finish_read(&png, nullptr, bytes.data(), 0, nullptr);
+        return std::pair{size, bytes};
+    };
+    const auto [size, plain] = draw({});
+    EXPECT_EQ(size, (std::vector<int>{44, 10}));
+    EXPECT_EQ((std::vector<std::uint8_t>(plain.begin(), plain.begin() + 6)),
+              (std::vector<std::uint8_t>{255, 0, 255, 188, 188, 188}));
+    EXPECT_EQ(plain[3 * 20], 255) << "the gap";
+    EXPECT_EQ(plain[3 * 24], 99) << "sRGB of 1/8";
+    EXPECT_EQ(draw({"--exposure", "2"}).second[3 * 24], 188);
+    const auto [titled_size, titled] = draw({"--titles", "a,b"});
+    EXPECT_GT(titled_size[1], 10);
+    EXPECT_NE(std::count(titled.begin(), titled.end(), 0), std::count(plain.begin(), plain.end(), 0));
+    expect_refused({"picture", scratch / "a.exr", "-o", scratch / "p.png", "--titles", "a,b"}, 2, "2 titles for 1 images");
+}

@@ -1,0 +1,64 @@
+#include "combine_report.hpp"
+
+namespace tool::combining {
+
+Json json_of(const Options& options, const Report& r) {
+    const auto channels = r.shape.channels.size();
+    Json out{{"batches", r.batches},
+             {"pixels", static_cast<std::uint64_t>(r.shape.width()) * static_cast<std::uint64_t>(r.shape.height())},
+             {"channels", channels},
+             {"estimator", options.estimator},
+             {"device", r.device},
+             {"output", options.output},
+             {"flags",
+              {{"zero_denominator", r.flags.zero_denominator},
+               {"zero_tau", r.flags.zero_tau},
+               {"skipped", r.flags.skipped},
+               {"no_data", r.flags.no_data},
+               {"no_error_bar", r.flags.no_error_bar},
+               {"nonfinite", r.flags.nonfinite},
+               {"any", r.flags.any}}},
+             {"negative_inputs", r.negatives},
+             {"seconds", {{"decode", r.seconds.decode}, {"device", r.seconds.device}, {"encode", r.seconds.encode}}}};
+    if (r.scores) {
+        out["rmse"] = r.scores->estimate.rmse;
+        out["bias"] = r.scores->estimate.bias;
+        out["rmse_mean"] = r.scores->mean.rmse;
+        out["bias_mean"] = r.scores->mean.bias;
+    }
+    return out;
+}
+
+namespace {
+
+void print_flags(const Options& options, const Report& r) {
+    fmt::print("{} of {} values flagged\n", r.flagged,
+               static_cast<std::uint64_t>(r.shape.width()) * static_cast<std::uint64_t>(r.shape.height()) *
+                   r.shape.channels.size());
+    const auto line = [](std::uint64_t count, const char* what) {
+        if (count != 0) fmt::print("  {:>10}  {}\n", count, what);
+    };
+    line(r.flags.zero_denominator, "mean t is 0: the zero policy gave the value");
+    line(r.flags.zero_tau, "tau is 0: the impulse guard gave the value");
+    line(r.flags.skipped, "a batch was not finite and left out");
+    line(r.flags.no_data, "no finite batch: the value is 0");
+    line(options.standard_error.empty() ? 0 : r.flags.no_error_bar, "fewer than two batches: no error bar");
+    line(r.flags.nonfinite, "the estimate is not finite");
+    line(r.negatives, "negative inputs (counted only)");
+}
+
+}  // namespace
+
+void print_text(const Options& options, const Report& r) {
+    fmt::print("{}: {} of {} batch{}, {}x{} pixels, {} channels, on {}\n", options.output, options.estimator, r.batches,
+               r.batches == 1 ? "" : "es", r.shape.width(), r.shape.height(), r.shape.channels.size(), r.device);
+    print_flags(options, r);
+    if (r.scores) {
+        fmt::print("against {}\n  {:<15} {:>10} {:>12}\n", options.reference, "", "RMSE", "bias");
+        fmt::print("  {:<15} {:>10.6f} {:>12.6f}\n", "plain mean", r.scores->mean.rmse, r.scores->mean.bias);
+        fmt::print("  {:<15} {:>10.6f} {:>12.6f}\n", options.estimator, r.scores->estimate.rmse, r.scores->estimate.bias);
+    }
+    fmt::print("decode {:.3f} s, device {:.3f} s, encode {:.3f} s\n", r.seconds.decode, r.seconds.device, r.seconds.encode);
+}
+
+}  // namespace tool::combining
