@@ -34,12 +34,6 @@ Reals draws(const ErrorModel& model, std::size_t n, std::uint64_t seed) {
 constexpr int bins = 256;
 constexpr double low = -2, high = 4;
 
-Reals edges() {
-    Reals e;
-    for (int i = 0; i <= bins; ++i) e.push_back(low + (high - low) * i / bins);
-    return e;
-}
-
 Counts count(const Reals& x) {
     Counts c(bins + 2);
     for (double v : x)
@@ -47,7 +41,7 @@ Counts count(const Reals& x) {
     return c;
 }
 
-Reals probabilities(Law law, const ErrorModel& model) { return ErrorLaw(law, model).bin_probabilities(edges()); }
+Reals probabilities(Law law, const ErrorModel& model) { return ErrorLaw(law, model).bin_probabilities(low, high, bins); }
 
 Fit anderson_darling(const ErrorLaw& law, const Reals& x) {
     Reals below, above;

@@ -353,6 +353,10 @@ TEST(LawBins, far_tails_keep_their_digits) {
 
 TEST(LawBins, bad_edges_are_refused) {
     const ErrorLaw law(Law::exact, {.5, 1, .5, .35});
+    EXPECT_THROW(law.bin_probabilities(0, 1, 0), InvalidArgument);
+    EXPECT_THROW(law.bin_probabilities(1, 1, 4), InvalidArgument);
+    EXPECT_THROW(law.bin_probabilities(0, infinity, 4), InvalidArgument);
+    EXPECT_EQ(law.bin_probabilities(0, 1, 4), law.bin_probabilities(std::vector<double>{0, .25, .5, .75, 1}));
     EXPECT_THROW(law.bin_probabilities(std::vector<double>{0}), InvalidArgument);
     EXPECT_THROW(law.bin_probabilities(std::vector<double>{0, 0}), InvalidArgument);
     EXPECT_THROW(law.bin_probabilities(std::vector<double>{1, 0}), InvalidArgument);
