@@ -191,6 +191,13 @@ std::vector<double> ErrorLaw::bin_probabilities(std::span<const double> edges) c
     return out;
 }
 
+std::vector<double> ErrorLaw::bin_probabilities(double lo, double hi, std::uint32_t count) const {
+    std::vector<double> edges{lo};
+    for (std::uint32_t i = 1; i < count; ++i) edges.push_back(lo + (hi - lo) * i / count);
+    if (count > 0) edges.push_back(hi);
+    return bin_probabilities(edges);
+}
+
 std::vector<double> ErrorLaw::improper_masses(std::span<const double> edges) const {
     const ErrorLaw exact(Law::exact, model_);
     std::vector<double> out{exact.cdf(edges.front())};

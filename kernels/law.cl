@@ -43,26 +43,27 @@ static inline clr_law_lanes clr_load_models(global const clr_law* models, ulong 
 
 static inline clr_real clr_load_points(global const float* x, clr_law_task task, ulong first, ulong count) {
     if (!task.shared_x) return clr_load_view(x, task.x, first, count);
-    const ulong begin = first % task.points;
+    const ulong begin = first - first / task.points * task.points;
     if (begin + CLR_WIDTH <= task.points) return clr_load_view(x, task.x, begin, task.points);
     float lane[CLR_WIDTH];
     for (int i = 0; i < CLR_WIDTH; ++i) {
-        const ulong value = (first + i) % task.points;
-        lane[i] = x[task.x.offset + value / task.x.channels * task.x.stride + value % task.x.channels];
+        const ulong value = first + i - (first + i) / task.points * task.points;
+        const ulong pixel = value / task.x.channels;
+        lane[i] = x[task.x.offset + pixel * task.x.stride + (value - pixel * task.x.channels)];
     }
     return clr_load(lane);
 }
 
-#define CLR_LAW_KERNEL(word, formula)                                                                                   \
-    kernel void word(global const clr_law* models, global const float* x, global float* out, clr_law_task task,         \
-                     clr_range range) {                                                                                 \
-        const clr_span span = clr_my_span(range);                                                                       \
-        for (ulong v = span.begin; v < span.end; v += span.step) {                                                      \
-            const ulong first = v * CLR_WIDTH;                                                                          \
-            const clr_law_lanes m = clr_load_models(models, first, range.count, task.points);                           \
-            const clr_real y = formula(m, clr_load_points(x, task, first, range.count));                                \
-            clr_store_view(y, out, task.out, first, range.count);                                                       \
-        }                                                                                                               \
+#define CLR_LAW_KERNEL(word, formula)                                                                                       \
+    kernel void word(global const clr_law* models, global const float* x, global float* out, clr_law_task task,             \
+                     clr_range range) {                                                                                     \
+        const clr_span span = clr_my_span(range);                                                                           \
+        for (ulong v = span.begin; v < span.end; v += span.step) {                                                          \
+            const ulong first = v * CLR_WIDTH;                                                                              \
+            const clr_law_lanes m = clr_load_models(models, first, range.count, task.points);                               \
+            const clr_real y = formula(m, clr_load_points(x, task, first, range.count));                                    \
+            clr_store_view(y, out, task.out, first, range.count);                                                           \
+        }                                                                                                                   \
     }
 
 CLR_LAW_KERNEL(clr_each_law_pdf, clr_law_pdf)

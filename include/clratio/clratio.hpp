@@ -3,6 +3,9 @@
 
 #include "clratio/combine.hpp"
 #include "clratio/engine.hpp"
+#include "clratio/error.hpp"
 #include "clratio/exception.hpp"
+#include "clratio/fit.hpp"
+#include "clratio/law.hpp"
 #include "clratio/moments.hpp"
 #include "clratio/view.hpp"
