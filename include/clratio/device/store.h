@@ -12,7 +12,10 @@
     static inline void name(vector v, global element* p, clr_layout view, long at, ulong count) {                    \
         p += view.offset;                                                                                            \
         if (view.stride == view.channels && at >= 0 && (ulong)at + CLR_WIDTH <= count) {                             \
-            clr_store(v, p + at);                                                                                    \
+            if (((ulong)(p + at) & (sizeof(v) - 1)) == 0)                                                            \
+                *(global vector*)(p + at) = v;                                                                       \
+            else                                                                                                     \
+                clr_store(v, p + at);                                                                                \
             return;                                                                                                  \
         }                                                                                                            \
         element lane[CLR_WIDTH];                                                                                     \
