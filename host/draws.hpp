@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 
+#include "clratio/error.hpp"
 #include "clratio/stream.hpp"
 #include "launch.hpp"
 
@@ -17,7 +18,13 @@ device::clr_stream device_stream(const Stream& stream);
 /// Refuses ranges that end beyond end_of_stream.
 void check_range(std::uint64_t first, std::uint64_t count);
 
-/// Refuses views that are empty of memory, overlap themselves or do not fit their buffer.
+/// Refuses a law that is not finite, or whose s or b is negative.
+void check_law(const Canonical& law);
+
+/// Refuses views without memory or that do not fit their buffer; `name` is the argument's.
+void check_view(const View& view, std::size_t element_bytes, const char* name);
+
+/// The same, and views that overlap themselves.
 void check_output(const View& out, std::size_t element_bytes);
 
 void require_fp64(const Engine& engine, const char* what);

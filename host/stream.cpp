@@ -18,16 +18,21 @@ void check_range(std::uint64_t first, std::uint64_t count) {
         throw InvalidArgument("range", "an end of at most 2^60", std::to_string(first) + " + " + std::to_string(count));
 }
 
-void check_output(const View& out, std::size_t element_bytes) {
-    if (!out.mem) throw InvalidArgument("out", "a view of a buffer", "null");
-    if (out.channels == 0 || out.stride < out.channels)
-        throw InvalidArgument("out", "1 <= channels <= stride",
-                              "channels " + std::to_string(out.channels) + ", stride " + std::to_string(out.stride));
+void check_view(const View& view, std::size_t element_bytes, const char* name) {
+    if (!view.mem) throw InvalidArgument(name, "a view of a buffer", "null");
+    if (view.channels == 0) throw InvalidArgument(name, "at least 1 channel", "0");
     std::size_t bytes = 0;
-    check(clGetMemObjectInfo(out.mem, CL_MEM_SIZE, sizeof bytes, &bytes, nullptr), "clGetMemObjectInfo");
-    if (out.end() > bytes / element_bytes)
-        throw InvalidArgument("out", "a view inside its buffer of " + std::to_string(bytes) + " bytes",
-                              std::to_string(out.end()) + " elements of " + std::to_string(element_bytes) + " bytes");
+    check(clGetMemObjectInfo(view.mem, CL_MEM_SIZE, sizeof bytes, &bytes, nullptr), "clGetMemObjectInfo");
+    if (view.end() > bytes / element_bytes)
+        throw InvalidArgument(name, "a view inside its buffer of " + std::to_string(bytes) + " bytes",
+                              std::to_string(view.end()) + " elements of " + std::to_string(element_bytes) + " bytes");
+}
+
+void check_output(const View& out, std::size_t element_bytes) {
+    if (out.stride < out.channels)
+        throw InvalidArgument("out", "channels <= stride",
+                              "channels " + std::to_string(out.channels) + ", stride " + std::to_string(out.stride));
+    check_view(out, element_bytes, "out");
 }
 
 void require_fp64(const Engine& engine, const char* what) {
