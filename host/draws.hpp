@@ -22,7 +22,7 @@ void check_range(std::uint64_t first, std::uint64_t count);
 void check_law(const Canonical& law);
 
 /// Refuses views without memory or that do not fit their buffer; `name` is the argument's.
-void check_view(const View& view, std::size_t element_bytes, const char* name);
+void check_elements(const View& view, std::size_t element_bytes, const char* name);
 
 /// The same, and views that overlap themselves.
 void check_output(const View& out, std::size_t element_bytes);

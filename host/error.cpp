@@ -74,7 +74,7 @@ template <class Law>
 cl_event samples(const Engine& engine, const char* kernel, const Law& law, const BlockRange& blocks, const Stream& stream,
                  std::uint64_t first, View out, std::span<const cl_event> wait_list) {
     return Launch(engine, "error", kernel, generator_option(stream.generator))
-        .arg(out)
+        .view(out)
         .arg(law)
         .arg(error_stream(stream))
         .arg(cl_ulong{first})

@@ -275,7 +275,7 @@ ErrorHistogram error_histogram(const Engine& engine, const Canonical& law, const
 Histogram histogram(const Engine& engine, View values, Bins bins, std::span<const cl_event> wait_list) {
     const auto on_device = device_bins<float>(bins);
     check_result(engine, 1, slots_of(bins));
-    check_view(values, sizeof(float), "values");
+    check_elements(values, sizeof(float), "values");
     const Tasks tasks(engine, slots_of(bins));
     const std::uint64_t parts = tasks.parts(1);
     std::vector<std::uint64_t> row(tasks.slots);
@@ -287,7 +287,7 @@ Histogram histogram(const Engine& engine, View values, Bins bins, std::span<cons
         const std::uint64_t vectors = divide_up(part.count, static_cast<std::uint64_t>(engine.width()));
         const Event counted = Launch(engine, "histogram", "clr_histogram_values", tasks.options(Generator::philox))
                                   .arg(rows)
-                                  .arg(part)
+                                  .view(part)
                                   .arg(on_device)
                                   .arg(cl_ulong{done})
                                   .arg(cl_ulong{done + part.count})

@@ -18,7 +18,7 @@ void check_range(std::uint64_t first, std::uint64_t count) {
         throw InvalidArgument("range", "an end of at most 2^60", std::to_string(first) + " + " + std::to_string(count));
 }
 
-void check_view(const View& view, std::size_t element_bytes, const char* name) {
+void check_elements(const View& view, std::size_t element_bytes, const char* name) {
     if (!view.mem) throw InvalidArgument(name, "a view of a buffer", "null");
     if (view.channels == 0) throw InvalidArgument(name, "at least 1 channel", "0");
     std::size_t bytes = 0;
@@ -32,7 +32,7 @@ void check_output(const View& out, std::size_t element_bytes) {
     if (out.stride < out.channels)
         throw InvalidArgument("out", "channels <= stride",
                               "channels " + std::to_string(out.channels) + ", stride " + std::to_string(out.stride));
-    check_view(out, element_bytes, "out");
+    check_elements(out, element_bytes, "out");
 }
 
 void require_fp64(const Engine& engine, const char* what) {
@@ -59,7 +59,7 @@ cl_event fill(const Engine& engine, const char* kernel, std::uint64_t per_block,
     if (element_bytes == sizeof(double)) require_fp64(engine, "double draws");
     const auto blocks = blocks_of(first, std::max<std::uint64_t>(1, out.count), per_block, engine.width());
     return Launch(engine, "stream", kernel, generator_option(stream.generator))
-        .arg(out)
+        .view(out)
         .arg(device)
         .arg(cl_ulong{first})
         .arg(cl_ulong{out.count})
