@@ -27,12 +27,12 @@ static inline void clr_count_all(CLR_COUNTERS uint* counters, clr_uint slots) {
     for (int i = 0; i < CLR_WIDTH; ++i) clr_count_one(counters, lane[i]);
 }
 
-// Counts the lanes i with 0 <= at + i step < count.
+// Counts the lanes i with 0 <= at + i step < count; a negative index is a large one here.
 static inline void clr_count_some(CLR_COUNTERS uint* counters, clr_uint slots, long at, int step, ulong count) {
     uint lane[CLR_WIDTH];
     clr_store(slots, lane);
     for (int i = 0; i < CLR_WIDTH; ++i)
-        if (at + i * step >= 0 && (ulong)(at + i * step) < count) clr_count_one(counters, lane[i]);
+        if ((ulong)(at + i * step) < count) clr_count_one(counters, lane[i]);
 }
 
 static inline void clr_group_barrier(void) {
@@ -69,6 +69,12 @@ static inline clr_span clr_part_span(uint part, ulong per_part, ulong vectors) {
     return s;
 }
 
+// A copy: PoCL's work-items share a by-value argument that they write to.
+static inline clr_stream clr_stream_of(clr_stream stream, uint model) {
+    stream.id += model;
+    return stream;
+}
+
 // Samples first .. first + count - 1 of laws[first_model + m] from stream id + m. Task: part * models + m.
 kernel void clr_histogram_errors(global uint* rows, global const clr_canonical* laws, ulong first_model, uint models, clr_stream stream, clr_bins bins,
                                  ulong first, ulong count, ulong first_block, ulong vectors, ulong per_part, local uint* shared) {
@@ -76,12 +82,12 @@ kernel void clr_histogram_errors(global uint* rows, global const clr_canonical* 
     global uint* row = rows + get_group_id(0) * slots;
     CLR_COUNTERS uint* counters = clr_start_row(row, shared, slots);
     const clr_canonical law = laws[first_model + model];
-    stream.id += model;
+    const clr_stream own = clr_stream_of(stream, model);
     const clr_span span = clr_part_span(part, per_part, vectors);
     for (ulong v = span.begin; v < span.end; v += span.step) {
         const ulong block = first_block + v * CLR_WIDTH;
         const long at = (long)(2 * block) - (long)first;
-        const clr_words w = clr_draw(CLR_GENERATOR, stream, block);
+        const clr_words w = clr_draw(CLR_GENERATOR, own, block);
         const clr_uint even = clr_slot(bins, clr_error_sample(law, w.w0, w.w1));
         const clr_uint odd = clr_slot(bins, clr_error_sample(law, w.w2, w.w3));
         if (at >= 0 && (ulong)at + 2 * CLR_WIDTH <= count) {
@@ -103,11 +109,11 @@ kernel void clr_histogram_errors_double(global uint* rows, global const clr_cano
     global uint* row = rows + get_group_id(0) * slots;
     CLR_COUNTERS uint* counters = clr_start_row(row, shared, slots);
     const clr_canonical_double law = laws[first_model + model];
-    stream.id += model;
+    const clr_stream own = clr_stream_of(stream, model);
     const clr_span span = clr_part_span(part, per_part, vectors);
     for (ulong v = span.begin; v < span.end; v += span.step) {
         const ulong block = first_block + v * CLR_WIDTH;
-        const clr_words w = clr_draw(CLR_GENERATOR, stream, block);
+        const clr_words w = clr_draw(CLR_GENERATOR, own, block);
         const clr_uint slot = clr_slot_double(bins, clr_error_sample_double(law, w.w0, w.w1, w.w2, w.w3));
         clr_count_some(counters, slot, (long)block - (long)first, 1, count);
     }

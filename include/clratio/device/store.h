@@ -21,7 +21,7 @@
         element lane[CLR_WIDTH];                                                                                     \
         clr_store(v, lane);                                                                                          \
         for (int i = 0; i < CLR_WIDTH; ++i) {                                                                        \
-            if (at + i < 0 || (ulong)(at + i) >= count) continue;                                                    \
+            if ((ulong)(at + i) >= count) continue;                                                                  \
             const ulong pixel = (ulong)(at + i) / view.channels;                                                     \
             p[pixel * view.stride + ((ulong)(at + i) - pixel * view.channels)] = lane[i];                            \
         }                                                                                                            \
