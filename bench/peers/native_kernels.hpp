@@ -23,14 +23,14 @@ struct NativeKernels {
     }
 
     static Fraction normal(U h) {
-        const U k = V::bit_or(V::template shift_left<1>(V::bit_xor(h, V::template shift_right_signed<31>(h))), V::set_word(1));
-        const F p = V::from_unsigned(k), x = V::from_unsigned(V::sub(V::set_word(0), k));
-        const F u = V::mul(p, V::sub(V::set(0x1p33f), p));
-        const U e = V::bit_and(V::sub(V::set_word(0x3fb504f3u + (64u << 23)), V::bits(u)), V::set_word(0xff800000u));
-        const F f = V::fma(V::from_bits(V::add(V::bits(u), e)), V::set(0x1p-64f), V::set(-1.0f));
-        const F q = horner(f, {0.10102237f, -0.1641999f, 0.17333466f, -0.19873047f, 0.24959344f, -0.33336183f, 0.5000067f,
-                               -0.9999998f});
-        const F w = V::fma(V::from_signed(e), V::set(0.69314718f * 0x1p-23f), V::mul(q, f));
+        const U twice_j = V::template shift_left<1>(V::bit_xor(h, V::template shift_right_signed<31>(h)));
+        const F p = V::from_unsigned(V::bit_or(twice_j, V::set_word(1))), x = V::from_unsigned(V::and_not(twice_j, V::set_word(~0u)));
+        const U bits = V::bits(V::mul(p, V::sub(V::set(0x1p33f), p)));
+        const F linear = V::from_signed(V::sub(V::set_word((127u + 64u) << 23), bits));
+        const F m = V::from_bits(V::bit_or(V::bit_and(bits, V::set_word(0x007fffffu)), V::set_word(0x3f800000u)));
+        const F rest = horner(V::sub(m, V::set(1.5f)), {-0x1.578afap-7f, 0x1.1d506cp-6f, -0x1.a7b9fep-6f, 0x1.90d388p-5f,
+                                                        -0x1.94b470p-4f, 0x1.c72898p-3f, 0x1.b1df26p-6f, -0x1.e270dap-5f});
+        const F w = V::fma(linear, V::set(0.69314718f * 0x1p-23f), rest);
         const F n = horner(w, {0x1.9a375cp-55f, 0x1.f15ec8p-47f, 0x1.2a3ef2p-42f, 0x1.9a4af0p-39f, 0x1.74b766p-36f,
                                0x1.ca2b34p-34f, 0x1.40d932p-32f});
         const F d = horner(w, {0x1.f56f24p-19f, 0x1.046adcp-12f, 0x1.2eeb74p-9f, 0x1.1bda8ap-5f, 0x1.85ee80p-4f, 1.0f});

@@ -18,21 +18,23 @@ typedef struct {
     clr_real n, d;
 } clr_fraction;
 
-// -log of u 2^-64, for normal floats u; absolute error below 4e-8 + 2^-24 of the result. A minimax polynomial of degree 7 for
-// log(1 + f) / f on [sqrt(1/2) - 1, sqrt(2) - 1], 3.7e-8 from the truth.
+// -log of u 2^-64, for 2^-64 <= u <= 2^64; absolute error below 2.5e-7 + 2^-23 of the result. The bits of u, read as an integer,
+// are 2^23 (exponent + mantissa - 1): a piecewise linear log2. What is left of the log, log(2) (m - 1) - log m for a mantissa m in
+// [1, 2), is small: a minimax polynomial of degree 7 in m - 3/2, 1.9e-7 from the truth. Measured: 5 % of a sample's whole cost less
+// than splitting off the exponent.
 CLR_FN clr_real clr_minus_log_scaled(clr_real u) {
-    const clr_uint sqrt2 = (clr_uint)(0x3fb504f3u + (64u << 23));
-    const clr_uint exponent = (sqrt2 - clr_bits(u)) & (clr_uint)(0xff800000u);
-    const clr_real f = clr_fma(clr_from_bits(clr_bits(u) + exponent), (clr_real)(0x1p-64f), (clr_real)(-1.0f));
-    clr_real q = (clr_real)(0.10102237f);
-    q = clr_fma(q, f, (clr_real)(-0.1641999f));
-    q = clr_fma(q, f, (clr_real)(0.17333466f));
-    q = clr_fma(q, f, (clr_real)(-0.19873047f));
-    q = clr_fma(q, f, (clr_real)(0.24959344f));
-    q = clr_fma(q, f, (clr_real)(-0.33336183f));
-    q = clr_fma(q, f, (clr_real)(0.5000067f));
-    q = clr_fma(q, f, (clr_real)(-0.9999998f));
-    return clr_fma(clr_to_real(clr_to_int(exponent)), (clr_real)(0.69314718f * 0x1p-23f), q * f);
+    const clr_uint bits = clr_bits(u);
+    const clr_real linear = clr_to_real(clr_to_int((clr_uint)((127u + 64u) << 23) - bits));
+    const clr_real g = clr_from_bits((bits & (clr_uint)(0x007fffffu)) | (clr_uint)(0x3f800000u)) - (clr_real)(1.5f);
+    clr_real rest = (clr_real)(-0x1.578afap-7f);
+    rest = clr_fma(rest, g, (clr_real)(0x1.1d506cp-6f));
+    rest = clr_fma(rest, g, (clr_real)(-0x1.a7b9fep-6f));
+    rest = clr_fma(rest, g, (clr_real)(0x1.90d388p-5f));
+    rest = clr_fma(rest, g, (clr_real)(-0x1.94b470p-4f));
+    rest = clr_fma(rest, g, (clr_real)(0x1.c72898p-3f));
+    rest = clr_fma(rest, g, (clr_real)(0x1.b1df26p-6f));
+    rest = clr_fma(rest, g, (clr_real)(-0x1.e270dap-5f));
+    return clr_fma(linear, (clr_real)(0.69314718f * 0x1p-23f), rest);
 }
 
 // The standard normal quantile at the midpoint (h + 1/2) 2^-32: with the tail probability p = k 2^-33 <= 1/2, k = 2 j + 1,
@@ -40,9 +42,9 @@ CLR_FN clr_real clr_minus_log_scaled(clr_real u) {
 // At most 8 ulp and 6e-7 relative after the division. The coefficients are the spec's minimax fit, N's scaled by 2^-32.
 CLR_FN clr_fraction clr_normal_fraction(clr_uint h) {
     const clr_uint upper_half = (clr_uint)(0u) - (h >> 31);
-    const clr_uint k = ((h ^ upper_half) << 1) | (clr_uint)(1u);
-    const clr_real p = clr_to_real(k);
-    const clr_real x = clr_to_real((clr_uint)(0u) - k);
+    const clr_uint twice_j = (h ^ upper_half) << 1;
+    const clr_real p = clr_to_real(twice_j | (clr_uint)(1u));
+    const clr_real x = clr_to_real(~twice_j);  // 2^32 - k
     const clr_real w = clr_minus_log_scaled(p * ((clr_real)(0x1p33f) - p));
     clr_real n = (clr_real)(0x1.9a375cp-55f);
     n = clr_fma(n, w, (clr_real)(0x1.f15ec8p-47f));
