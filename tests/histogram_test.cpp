@@ -264,8 +264,9 @@ TEST(Histogram, counts_catch_planted_faults) {
     };
     EXPECT_TRUE(equal("kernel", "kernel"));
     EXPECT_FALSE(equal("position < top ? position : top", "position < top ? position + 1.0f : top"));  // off by one bin
-    EXPECT_FALSE(equal("for (int i = 0; i < CLR_WIDTH; ++i)", "for (int i = 1; i < CLR_WIDTH; ++i)"));  // a lost lane
-    EXPECT_FALSE(equal("clr_count_all(counters, odd);", ""));                                           // a lost half
+    EXPECT_FALSE(equal("i < queue.waiting", "i + 1 < queue.waiting"));                                  // a lost lane
+    EXPECT_FALSE(equal("to[1] = odd", "to[1] = even"));                                                 // half counted twice
+    EXPECT_FALSE(equal("#if !CLR_GROUPED\n    clr_count_waiting(queue, counters);", "#if 0\n"));         // the last step lost
     EXPECT_FALSE(equal("(ulong)(at + i * step) < count", "at + i * step < (long)count"));                  // draws before the first
     EXPECT_FALSE(equal("(float)(bins.count + CLR_OVERFLOW)", "(float)(bins.count - 1)"));               // clamped in
 }

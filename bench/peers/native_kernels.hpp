@@ -125,12 +125,18 @@ struct NativeKernels {
 
     static void histogram(clratio::device::clr_canonical law, clratio::Stream stream, std::uint64_t first, std::uint64_t count,
                           Binning b, std::uint32_t* row) {
-        alignas(64) std::uint32_t slot[2 * V::lane_count];
+        // The slots of one step are counted in the next, when they have left the store buffer.
+        constexpr std::size_t step = 2 * V::lane_count;
+        alignas(64) std::uint32_t slot[2 * step];
+        std::size_t current = 0, waiting = 0;
         each(law, stream, first, count, [&](std::uint64_t, F even, F odd) {
-            V::store_slots(even, b, slot);
-            V::store_slots(odd, b, slot + V::lane_count);
-            for (const std::uint32_t s : slot) ++row[s];
+            V::store_slots(even, b, slot + current);
+            V::store_slots(odd, b, slot + current + V::lane_count);
+            current ^= step;
+            for (std::size_t i = 0; i < waiting; ++i) ++row[slot[current + i]];
+            waiting = step;
         });
+        for (std::size_t i = 0; i < waiting; ++i) ++row[slot[(current ^ step) + i]];
     }
 };
 
