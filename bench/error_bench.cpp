@@ -15,8 +15,7 @@ constexpr std::size_t samples = std::size_t{1} << 26;
 const Canonical law = canonical({.mu = .5, .tau = 1, .sigma_m = .5, .sigma_t = .35});
 
 /// Runs fill(first, out) over fresh indices into the same memory, which is touched before.
-template <class T, class Fill>
-void measure(benchmark::State& state, std::size_t count, Fill fill) {
+template <class T, class Fill> void measure(benchmark::State& state, std::size_t count, Fill fill) {
     std::vector<T> out(count);
     std::uint64_t first = 0;
     fill(first, std::span(out));
@@ -24,8 +23,7 @@ void measure(benchmark::State& state, std::size_t count, Fill fill) {
     state.SetItemsProcessed(static_cast<std::int64_t>(state.iterations() * count));
 }
 
-template <class T>
-void clratio_samples(benchmark::State& state, Generator generator) {
+template <class T> void clratio_samples(benchmark::State& state, Generator generator) {
     const Engine engine;
     measure<T>(state, samples / (sizeof(T) / sizeof(float)), [&](std::uint64_t first, std::span<T> out) {
         error_samples(engine, law, {.seed = 1, .generator = generator}, first, out);
@@ -45,11 +43,13 @@ void native(benchmark::State& state, Generator generator) {
 }
 
 void random123(benchmark::State& state) {
-    measure<float>(state, samples / 4, [](std::uint64_t first, std::span<float> out) { peers::random123_samples(law, 1, first, out); });
+    measure<float>(state, samples / 4,
+                   [](std::uint64_t first, std::span<float> out) { peers::random123_samples(law, 1, first, out); });
 }
 
 void standard_library(benchmark::State& state) {
-    measure<float>(state, samples / 8, [](std::uint64_t first, std::span<float> out) { peers::standard_samples(law, 1 + first, out); });
+    measure<float>(state, samples / 8,
+                   [](std::uint64_t first, std::span<float> out) { peers::standard_samples(law, 1 + first, out); });
 }
 
 BENCHMARK_CAPTURE(error_samples_float, pcg4d3x, Generator::pcg4d3x)->MeasureProcessCPUTime()->UseRealTime();

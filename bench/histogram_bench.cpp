@@ -22,7 +22,8 @@ void count(benchmark::State& state, Generator generator, std::uint64_t models, P
     add_error_counts(engine, laws, {.seed = 1, .generator = generator}, {0, each}, bins, rows, {.precision = precision});
     std::uint64_t first = 0;
     for (auto _ : state) {
-        add_error_counts(engine, laws, {.seed = 1, .generator = generator}, {first, each}, bins, rows, {.precision = precision});
+        add_error_counts(engine, laws, {.seed = 1, .generator = generator}, {first, each}, bins, rows,
+                         {.precision = precision});
         first += each;
     }
     state.SetItemsProcessed(static_cast<std::int64_t>(state.iterations() * models * each));
@@ -40,12 +41,20 @@ void native_count(benchmark::State& state, const peers::NativeSet* set, Generato
     state.SetItemsProcessed(static_cast<std::int64_t>(state.iterations() * samples));
 }
 
-BENCHMARK_CAPTURE(count, pcg4d3x, Generator::pcg4d3x, 1, Precision::single_precision)->MeasureProcessCPUTime()->UseRealTime();
+BENCHMARK_CAPTURE(count, pcg4d3x, Generator::pcg4d3x, 1, Precision::single_precision)
+    ->MeasureProcessCPUTime()
+    ->UseRealTime();
 BENCHMARK_CAPTURE(native_count, pcg4d3x, peers::native_set(), Generator::pcg4d3x)->MeasureProcessCPUTime()->UseRealTime();
-BENCHMARK_CAPTURE(count, pcg4d3x_10000_models, Generator::pcg4d3x, 10000, Precision::single_precision)->MeasureProcessCPUTime()->UseRealTime();
+BENCHMARK_CAPTURE(count, pcg4d3x_10000_models, Generator::pcg4d3x, 10000, Precision::single_precision)
+    ->MeasureProcessCPUTime()
+    ->UseRealTime();
 BENCHMARK_CAPTURE(count, philox, Generator::philox, 1, Precision::single_precision)->MeasureProcessCPUTime()->UseRealTime();
 BENCHMARK_CAPTURE(native_count, philox, peers::native_set(), Generator::philox)->MeasureProcessCPUTime()->UseRealTime();
-BENCHMARK_CAPTURE(count, philox_10000_models, Generator::philox, 10000, Precision::single_precision)->MeasureProcessCPUTime()->UseRealTime();
-BENCHMARK_CAPTURE(count, philox_double, Generator::philox, 1, Precision::double_precision)->MeasureProcessCPUTime()->UseRealTime();
+BENCHMARK_CAPTURE(count, philox_10000_models, Generator::philox, 10000, Precision::single_precision)
+    ->MeasureProcessCPUTime()
+    ->UseRealTime();
+BENCHMARK_CAPTURE(count, philox_double, Generator::philox, 1, Precision::double_precision)
+    ->MeasureProcessCPUTime()
+    ->UseRealTime();
 
 }  // namespace

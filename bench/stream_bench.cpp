@@ -11,8 +11,7 @@ using namespace clratio;
 
 constexpr std::size_t draws = std::size_t{1} << 26;
 
-template <class T, class Fill>
-void measure(benchmark::State& state, Fill fill) {
+template <class T, class Fill> void measure(benchmark::State& state, Fill fill) {
     const Engine engine;
     std::vector<T> out(draws * sizeof(float) / sizeof(T));
     std::uint64_t first = 0;
@@ -28,15 +27,13 @@ void words(benchmark::State& state, Generator generator) {
     });
 }
 
-template <class T>
-void uniforms(benchmark::State& state, Generator generator) {
+template <class T> void uniforms(benchmark::State& state, Generator generator) {
     measure<T>(state, [=](const Engine& engine, std::uint64_t first, std::span<T> out) {
         fill_uniforms(engine, {.seed = 1, .generator = generator}, first, out);
     });
 }
 
-template <class T>
-void normals(benchmark::State& state, Generator generator) {
+template <class T> void normals(benchmark::State& state, Generator generator) {
     measure<T>(state, [=](const Engine& engine, std::uint64_t first, std::span<T> out) {
         fill_normals(engine, {.seed = 1, .generator = generator}, first, out);
     });

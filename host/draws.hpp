@@ -1,4 +1,5 @@
-// What all that draws from streams shares on the host: checks, and the blocks a range of draws touches. Private to the library.
+// What all that draws from streams shares on the host: checks, and the blocks a range of draws touches. Private to the
+// library.
 #pragma once
 
 #include <algorithm>
@@ -39,8 +40,7 @@ struct BlockRange {
 BlockRange blocks_of(std::uint64_t first, std::uint64_t count, std::uint64_t per_block, int width);
 
 /// Calls fill(buffer, index, count) for parts of `out` that fit into one allocation, and waits.
-template <class T, class Fill>
-void fill_in_parts(const Engine& engine, std::uint64_t first, std::span<T> out, Fill fill) {
+template <class T, class Fill> void fill_in_parts(const Engine& engine, std::uint64_t first, std::span<T> out, Fill fill) {
     const std::uint64_t largest = std::max<std::uint64_t>(1, engine.info().largest_allocation / sizeof(T));
     check_range(first, out.size());
     for (std::uint64_t done = 0; done < out.size();) {

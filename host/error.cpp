@@ -100,8 +100,8 @@ cl_event error_samples(const Engine& engine, const Canonical& law, const Stream&
     return samples(engine, "clr_error_samples", to_float(law), blocks, stream, first, out, wait_list);
 }
 
-cl_event error_samples_double(const Engine& engine, const Canonical& law, const Stream& stream, std::uint64_t first, View out,
-                              std::span<const cl_event> wait_list) {
+cl_event error_samples_double(const Engine& engine, const Canonical& law, const Stream& stream, std::uint64_t first,
+                              View out, std::span<const cl_event> wait_list) {
     check_law(law);
     require_fp64(engine, "double samples");
     check_range(first, out.count);
@@ -110,11 +110,14 @@ cl_event error_samples_double(const Engine& engine, const Canonical& law, const 
     return samples(engine, "clr_error_samples_double", law, blocks, stream, first, out, wait_list);
 }
 
-void error_samples(const Engine& engine, const Canonical& law, const Stream& stream, std::uint64_t first, std::span<float> out) {
-    fill_in_parts(engine, first, out, [&](View part, std::uint64_t at) { return error_samples(engine, law, stream, at, part); });
+void error_samples(const Engine& engine, const Canonical& law, const Stream& stream, std::uint64_t first,
+                   std::span<float> out) {
+    fill_in_parts(engine, first, out,
+                  [&](View part, std::uint64_t at) { return error_samples(engine, law, stream, at, part); });
 }
 
-void error_samples(const Engine& engine, const Canonical& law, const Stream& stream, std::uint64_t first, std::span<double> out) {
+void error_samples(const Engine& engine, const Canonical& law, const Stream& stream, std::uint64_t first,
+                   std::span<double> out) {
     fill_in_parts(engine, first, out,
                   [&](View part, std::uint64_t at) { return error_samples_double(engine, law, stream, at, part); });
 }
@@ -123,7 +126,8 @@ float error_sample(const Canonical& law, const Stream& stream, std::uint64_t ind
     check_law(law);
     check_range(index, 1);
     const auto w = block(stream, index / 2);
-    return index % 2 ? device::clr_error_sample(to_float(law), w.w2, w.w3) : device::clr_error_sample(to_float(law), w.w0, w.w1);
+    return index % 2 ? device::clr_error_sample(to_float(law), w.w2, w.w3)
+                     : device::clr_error_sample(to_float(law), w.w0, w.w1);
 }
 
 double error_sample_double(const Canonical& law, const Stream& stream, std::uint64_t index) {

@@ -13,15 +13,14 @@ constexpr std::uint64_t samples_a_launch = std::uint64_t{1} << 28;  // 32-bit co
 constexpr std::uint64_t least_samples_a_model = std::uint64_t{1} << 16;
 constexpr std::uint64_t row_memory = std::uint64_t{16} << 20;  // bytes
 
-template <class Real>
-struct DeviceBins {
+template <class Real> struct DeviceBins {
     Real lo, hi, inverse_width;
     std::uint32_t count;
 };
 
-template <class Real>
-DeviceBins<Real> device_bins(const Bins& bins) {
-    if (bins.count < 1 || bins.count > (1u << 23)) throw InvalidArgument("bins", "1 to 2^23 bins", std::to_string(bins.count));
+template <class Real> DeviceBins<Real> device_bins(const Bins& bins) {
+    if (bins.count < 1 || bins.count > (1u << 23))
+        throw InvalidArgument("bins", "1 to 2^23 bins", std::to_string(bins.count));
     const auto lo = static_cast<Real>(bins.lo), hi = static_cast<Real>(bins.hi);
     const Real inverse_width = static_cast<Real>(bins.count) / (hi - lo);
     if (!(lo < hi) || !std::isfinite(hi - lo) || !std::isfinite(inverse_width))
@@ -95,10 +94,10 @@ struct ErrorLaunch {
     IndexRange range;
 };
 
-template <class Law, class Real>
-class ErrorCounter {
+template <class Law, class Real> class ErrorCounter {
 public:
-    ErrorCounter(const Engine& engine, std::vector<Law> laws, const Stream& stream, const Bins& bins, std::span<std::uint64_t> rows)
+    ErrorCounter(const Engine& engine, std::vector<Law> laws, const Stream& stream, const Bins& bins,
+                 std::span<std::uint64_t> rows)
         : engine_(engine), laws_(std::move(laws)), law_buffer_(Buffer::from_host(engine, std::as_bytes(std::span(laws_)))),
           stream_(stream), bins_(device_bins<Real>(bins)), tasks_(engine, slots_of(bins)), totals_(engine, rows) {
         at_once_ = std::min({std::uint64_t{laws_.size()}, tasks_.most_rows(), samples_a_launch / least_samples_a_model});
@@ -183,7 +182,8 @@ std::vector<IndexRange> join(std::vector<IndexRange> ranges) {
     for (const IndexRange& r : ranges) {
         const std::uint64_t end = joined.empty() ? 0 : joined.back().first + joined.back().count;
         if (!joined.empty() && r.first < end)
-            throw InvalidArgument("histogram", "other samples than those it already holds", "sample " + std::to_string(r.first) + " twice");
+            throw InvalidArgument("histogram", "other samples than those it already holds",
+                                  "sample " + std::to_string(r.first) + " twice");
         if (!joined.empty() && r.first == end)
             joined.back().count += r.count;
         else
@@ -203,8 +203,9 @@ std::uint64_t Histogram::total() const {
 
 Histogram& Histogram::operator+=(const Histogram& other) {
     if (bins.size() != other.bins.size() || lo != other.lo || hi != other.hi)
-        throw InvalidArgument("histogram", "the same bins", std::to_string(other.bins.size()) + " bins on [" + std::to_string(other.lo) +
-                                                                ", " + std::to_string(other.hi) + ")");
+        throw InvalidArgument("histogram", "the same bins",
+                              std::to_string(other.bins.size()) + " bins on [" + std::to_string(other.lo) + ", " +
+                                  std::to_string(other.hi) + ")");
     for (std::size_t i = 0; i < bins.size(); ++i) bins[i] += other.bins[i];
     underflow += other.underflow;
     overflow += other.overflow;
@@ -224,27 +225,30 @@ ErrorHistogram& ErrorHistogram::operator+=(const ErrorHistogram& other) {
     return *this;
 }
 
-void add_error_counts(const Engine& engine, std::span<const Canonical> laws, const Stream& stream, IndexRange range, Bins bins,
-                      std::span<std::uint64_t> rows, const HistogramOptions& options) {
+void add_error_counts(const Engine& engine, std::span<const Canonical> laws, const Stream& stream, IndexRange range,
+                      Bins bins, std::span<std::uint64_t> rows, const HistogramOptions& options) {
     const bool doubles = options.precision == Precision::double_precision;
     if (laws.empty()) throw InvalidArgument("laws", "at least one", "none");
     for (const Canonical& law : laws) check_law(law);
     device_stream(stream);
     if (laws.size() - 1 > 0xffffffffu - stream.id)
-        throw InvalidArgument("stream.id", "ids below 2^32 for all laws", std::to_string(stream.id) + " + " + std::to_string(laws.size()));
+        throw InvalidArgument("stream.id", "ids below 2^32 for all laws",
+                              std::to_string(stream.id) + " + " + std::to_string(laws.size()));
     if (range.count == 0) throw InvalidArgument("range", "at least one sample", "an empty range");
     check_range(range.first, range.count);
     doubles ? void(device_bins<double>(bins)) : void(device_bins<float>(bins));
     check_result(engine, laws.size(), slots_of(bins));
     if (rows.size() != laws.size() * slots_of(bins))
-        throw InvalidArgument("rows", std::to_string(laws.size() * slots_of(bins)) + " counters", std::to_string(rows.size()));
+        throw InvalidArgument("rows", std::to_string(laws.size() * slots_of(bins)) + " counters",
+                              std::to_string(rows.size()));
     if (doubles) {
         require_fp64(engine, "double samples");
         ErrorCounter<Canonical, double>(engine, {laws.begin(), laws.end()}, stream, bins, rows).run(range, options.progress);
     } else {
         std::vector<device::clr_canonical> floats(laws.size());
         std::transform(laws.begin(), laws.end(), floats.begin(), to_float);
-        ErrorCounter<device::clr_canonical, float>(engine, std::move(floats), stream, bins, rows).run(range, options.progress);
+        ErrorCounter<device::clr_canonical, float>(engine, std::move(floats), stream, bins, rows)
+            .run(range, options.progress);
     }
 }
 

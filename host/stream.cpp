@@ -51,8 +51,8 @@ BlockRange blocks_of(std::uint64_t first, std::uint64_t count, std::uint64_t per
 
 namespace {
 
-cl_event fill(const Engine& engine, const char* kernel, std::uint64_t per_block, std::size_t element_bytes, const Stream& stream,
-              std::uint64_t first, View out, std::span<const cl_event> wait_list) {
+cl_event fill(const Engine& engine, const char* kernel, std::uint64_t per_block, std::size_t element_bytes,
+              const Stream& stream, std::uint64_t first, View out, std::span<const cl_event> wait_list) {
     const auto device = device_stream(stream);
     check_range(first, out.count);
     check_output(out, element_bytes);
@@ -104,7 +104,8 @@ double normal_double(const Stream& stream, std::uint64_t index) {
     return device::clr_normal_double(w.low, w.high);
 }
 
-cl_event fill_words(const Engine& engine, const Stream& stream, std::uint64_t first, View out, std::span<const cl_event> wait_list) {
+cl_event fill_words(const Engine& engine, const Stream& stream, std::uint64_t first, View out,
+                    std::span<const cl_event> wait_list) {
     return fill(engine, "clr_fill_words", 4, sizeof(std::uint32_t), stream, first, out, wait_list);
 }
 
@@ -137,7 +138,8 @@ void fill_uniforms(const Engine& engine, const Stream& stream, std::uint64_t fir
 }
 
 void fill_uniforms(const Engine& engine, const Stream& stream, std::uint64_t first, std::span<double> out) {
-    fill_in_parts(engine, first, out, [&](View part, std::uint64_t at) { return fill_uniforms_double(engine, stream, at, part); });
+    fill_in_parts(engine, first, out,
+                  [&](View part, std::uint64_t at) { return fill_uniforms_double(engine, stream, at, part); });
 }
 
 void fill_normals(const Engine& engine, const Stream& stream, std::uint64_t first, std::span<float> out) {
@@ -145,7 +147,8 @@ void fill_normals(const Engine& engine, const Stream& stream, std::uint64_t firs
 }
 
 void fill_normals(const Engine& engine, const Stream& stream, std::uint64_t first, std::span<double> out) {
-    fill_in_parts(engine, first, out, [&](View part, std::uint64_t at) { return fill_normals_double(engine, stream, at, part); });
+    fill_in_parts(engine, first, out,
+                  [&](View part, std::uint64_t at) { return fill_normals_double(engine, stream, at, part); });
 }
 
 }  // namespace clratio

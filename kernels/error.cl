@@ -4,8 +4,8 @@
 #include "clratio/device/stream.h"
 
 // range counts the blocks from first_block on, a multiple of CLR_WIDTH.
-kernel void clr_error_samples(global float* out, clr_layout layout, clr_canonical law, clr_stream stream, ulong first, ulong count,
-                              ulong first_block, clr_range range) {
+kernel void clr_error_samples(global float* out, clr_layout layout, clr_canonical law, clr_stream stream, ulong first,
+                              ulong count, ulong first_block, clr_range range) {
     const clr_span span = clr_my_span(range);
     for (ulong v = span.begin; v < span.end; v += span.step) {
         const ulong block = first_block + v * CLR_WIDTH;

@@ -1,7 +1,7 @@
 // Histograms of error samples, drawn and counted in one go, and of values in memory.
-// A work-group is a task: one part of one model's samples, counted in a row of 32-bit counters of its own. clr_add_rows adds the
-// rows of all parts to 64-bit totals. CLR_GROUPED = 0: one work-item to a group, no atomics. CLR_GROUPED = 1: the group shares the
-// row, in local memory where CLR_LOCAL_ROWS. CLR_GENERATOR: CLR_PHILOX or CLR_PCG4D3X.
+// A work-group is a task: one part of one model's samples, counted in a row of 32-bit counters of its own. clr_add_rows adds
+// the rows of all parts to 64-bit totals. CLR_GROUPED = 0: one work-item to a group, no atomics. CLR_GROUPED = 1: the group
+// shares the row, in local memory where CLR_LOCAL_ROWS. CLR_GENERATOR: CLR_PHILOX or CLR_PCG4D3X.
 #include "clratio/device/error.h"
 #include "clratio/device/histogram.h"
 #include "clratio/device/layout.h"
@@ -36,8 +36,8 @@ static inline void clr_count_some(CLR_COUNTERS uint* counters, clr_uint slots, l
 }
 
 #if !CLR_GROUPED
-// The slots of one step are counted in the next, read back from memory: taking a vector's lanes out one by one would compete with
-// the arithmetic for the vector unit. Measured: about 1.1 times as fast.
+// The slots of one step are counted in the next, read back from memory: taking a vector's lanes out one by one would compete
+// with the arithmetic for the vector unit. Measured: about 1.1 times as fast.
 typedef struct {
     local uint* slots;  // two steps of 2 CLR_WIDTH
     uint next;          // where the next step goes
@@ -101,9 +101,11 @@ static inline clr_stream clr_stream_of(clr_stream stream, uint model) {
 }
 
 // Samples first .. first + count - 1 of laws[first_model + m] from stream id + m. Task: part * models + m.
-kernel void clr_histogram_errors(global uint* rows, global const clr_canonical* laws, ulong first_model, uint models, clr_stream stream, clr_bins bins,
-                                 ulong first, ulong count, ulong first_block, ulong vectors, ulong per_part, local uint* shared) {
-    const uint slots = bins.count + CLR_OUTER_SLOTS, part = get_group_id(0) / models, model = get_group_id(0) % models;
+kernel void clr_histogram_errors(global uint* rows, global const clr_canonical* laws, ulong first_model, uint models,
+                                 clr_stream stream, clr_bins bins, ulong first, ulong count, ulong first_block,
+                                 ulong vectors, ulong per_part, local uint* shared) {
+    const uint slots = bins.count + CLR_OUTER_SLOTS, part = get_group_id(0) / models,
+               model = get_group_id(0) - part * models;
     global uint* row = rows + get_group_id(0) * slots;
     CLR_COUNTERS uint* counters = clr_start_row(row, shared, slots);
     const clr_canonical law = laws[first_model + model];
@@ -138,10 +140,11 @@ kernel void clr_histogram_errors(global uint* rows, global const clr_canonical* 
 }
 
 #if CLR_FP64
-kernel void clr_histogram_errors_double(global uint* rows, global const clr_canonical_double* laws, ulong first_model, uint models, clr_stream stream,
-                                        clr_bins_double bins, ulong first, ulong count, ulong first_block, ulong vectors,
-                                        ulong per_part, local uint* shared) {
-    const uint slots = bins.count + CLR_OUTER_SLOTS, part = get_group_id(0) / models, model = get_group_id(0) % models;
+kernel void clr_histogram_errors_double(global uint* rows, global const clr_canonical_double* laws, ulong first_model,
+                                        uint models, clr_stream stream, clr_bins_double bins, ulong first, ulong count,
+                                        ulong first_block, ulong vectors, ulong per_part, local uint* shared) {
+    const uint slots = bins.count + CLR_OUTER_SLOTS, part = get_group_id(0) / models,
+               model = get_group_id(0) - part * models;
     global uint* row = rows + get_group_id(0) * slots;
     CLR_COUNTERS uint* counters = clr_start_row(row, shared, slots);
     const clr_canonical_double law = laws[first_model + model];
@@ -158,8 +161,8 @@ kernel void clr_histogram_errors_double(global uint* rows, global const clr_cano
 #endif
 
 // The values first .. end - 1 of a view. Task: part.
-kernel void clr_histogram_values(global uint* rows, global const float* x, clr_layout layout, clr_bins bins, ulong first, ulong end,
-                                 ulong vectors, ulong per_part, local uint* shared) {
+kernel void clr_histogram_values(global uint* rows, global const float* x, clr_layout layout, clr_bins bins, ulong first,
+                                 ulong end, ulong vectors, ulong per_part, local uint* shared) {
     const uint slots = bins.count + CLR_OUTER_SLOTS;
     global uint* row = rows + get_group_id(0) * slots;
     CLR_COUNTERS uint* counters = clr_start_row(row, shared, slots);

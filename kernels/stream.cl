@@ -4,8 +4,8 @@
 #include "clratio/device/store.h"
 #include "clratio/device/stream.h"
 
-kernel void clr_fill_words(global uint* out, clr_layout layout, clr_stream stream, ulong first, ulong count, ulong first_block,
-                           clr_range range) {
+kernel void clr_fill_words(global uint* out, clr_layout layout, clr_stream stream, ulong first, ulong count,
+                           ulong first_block, clr_range range) {
     const clr_span span = clr_my_span(range);
     for (ulong v = span.begin; v < span.end; v += span.step) {
         const ulong block = first_block + v * CLR_WIDTH;
@@ -25,8 +25,8 @@ kernel void clr_fill_uniforms(global float* out, clr_layout layout, clr_stream s
     }
 }
 
-kernel void clr_fill_normals(global float* out, clr_layout layout, clr_stream stream, ulong first, ulong count, ulong first_block,
-                             clr_range range) {
+kernel void clr_fill_normals(global float* out, clr_layout layout, clr_stream stream, ulong first, ulong count,
+                             ulong first_block, clr_range range) {
     const clr_span span = clr_my_span(range);
     for (ulong v = span.begin; v < span.end; v += span.step) {
         const ulong block = first_block + v * CLR_WIDTH;

@@ -50,7 +50,8 @@ bool is_equation_14(const ErrorModel& e, const Stream& stream, const std::vector
     Stream words = stream;
     words.domain = Domain::error;
     for (std::size_t i = 0; i < got.size(); ++i) {
-        const double z1 = reference_normal(word(words, 2 * (first + i))), z2 = reference_normal(word(words, 2 * (first + i) + 1));
+        const double z1 = reference_normal(word(words, 2 * (first + i))),
+                     z2 = reference_normal(word(words, 2 * (first + i) + 1));
         const double root = std::sqrt(static_cast<double>(e.n)), impulse = e.tau == 0, c = e.tau + impulse;
         // Z2 is the relative denominator's noise: T = tau + sign(c) sigma_t Z2.
         const double sign = c < 0 ? -1 : 1;
@@ -69,7 +70,9 @@ template <class Call> void refused(const char* name, Call call) {
     try {
         call();
         ADD_FAILURE() << name << " was accepted";
-    } catch (const InvalidArgument& e) { EXPECT_NE(std::string(e.what()).find(name), std::string::npos) << e.what(); }
+    } catch (const InvalidArgument& e) {
+        EXPECT_NE(std::string(e.what()).find(name), std::string::npos) << e.what();
+    }
 }
 
 const std::vector<std::uint64_t> starts{0, 1, 33, (1ull << 32) - 501, (1ull << 33) - 700, end_of_stream - 1003};
@@ -85,7 +88,8 @@ TEST(Error, samples_have_the_same_bits_in_every_shape_and_range) {
             for (const std::uint64_t first : starts) {
                 std::vector<float> got(count);
                 error_samples(engine, laws()[1], stream, first, got);
-                ASSERT_TRUE(same_bits(got, host_samples(laws()[1], stream, first, count))) << shape.name << " from " << first;
+                ASSERT_TRUE(same_bits(got, host_samples(laws()[1], stream, first, count)))
+                    << shape.name << " from " << first;
             }
         }
     }
@@ -138,8 +142,13 @@ TEST(Error, equation_14_catches_planted_faults) {
         constexpr std::uint64_t count = 4096;
         const Buffer out(engine, count * sizeof(float));
         RawKernel(engine, replaced(flatten_kernel("error"), from, to), "clr_error_samples", "-DCLR_GENERATOR=CLR_PHILOX")
-            .arg(out).arg(device::clr_layout{0, 1, 1}).arg(to_float(canonical(model))).arg(device::clr_stream{1, 0, CLR_DOMAIN_ERROR})
-            .arg(cl_ulong{0}).arg(cl_ulong{count}).arg(cl_ulong{0})
+            .arg(out)
+            .arg(device::clr_layout{0, 1, 1})
+            .arg(to_float(canonical(model)))
+            .arg(device::clr_stream{1, 0, CLR_DOMAIN_ERROR})
+            .arg(cl_ulong{0})
+            .arg(cl_ulong{count})
+            .arg(cl_ulong{0})
             .arg(device::clr_range{count / 2, count / 2 / static_cast<std::uint64_t>(engine.width())})
             .run(1, 1);
         return is_equation_14(model, {1}, contents<float>(out), 0);

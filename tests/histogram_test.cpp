@@ -46,8 +46,20 @@ Row row_of(const Histogram& h) {
 
 std::vector<float> edge_values(const Bins& b) {
     const auto lo = static_cast<float>(b.lo), hi = static_cast<float>(b.hi);
-    std::vector<float> v{lo, hi, -infinity, infinity, nan_value, 0.0f, -0.0f, 1e-45f, -3.4e38f, 3.4e38f,
-                         std::nextafter(lo, -infinity), std::nextafter(lo, infinity), std::nextafter(hi, -infinity), std::nextafter(hi, infinity)};
+    std::vector<float> v{lo,
+                         hi,
+                         -infinity,
+                         infinity,
+                         nan_value,
+                         0.0f,
+                         -0.0f,
+                         1e-45f,
+                         -3.4e38f,
+                         3.4e38f,
+                         std::nextafter(lo, -infinity),
+                         std::nextafter(lo, infinity),
+                         std::nextafter(hi, -infinity),
+                         std::nextafter(hi, infinity)};
     for (std::uint32_t k = 0; k < b.count; ++k) {
         const float edge = lo + static_cast<float>(k) * ((hi - lo) / static_cast<float>(b.count));
         for (const float x : {std::nextafter(edge, -infinity), edge, std::nextafter(edge, infinity)}) v.push_back(x);
@@ -59,7 +71,9 @@ template <class Call> void refused(const char* name, Call call) {
     try {
         call();
         ADD_FAILURE() << name << " was accepted";
-    } catch (const InvalidArgument& e) { EXPECT_NE(std::string(e.what()).find(name), std::string::npos) << e.what(); }
+    } catch (const InvalidArgument& e) {
+        EXPECT_NE(std::string(e.what()).find(name), std::string::npos) << e.what();
+    }
 }
 
 std::uint64_t peak_memory_kb() {
@@ -75,7 +89,8 @@ TEST(Histogram, slots_follow_the_contract_at_every_edge) {
     for (const Bins& b : {bins, Bins{-1.5, 1.5, 1000}, Bins{0, 1, 3}, Bins{-3, 0, 7}, Bins{1e-3, 1e3, 50}, Bins{-2, 4, 1}}) {
         const auto lo = static_cast<float>(b.lo), hi = static_cast<float>(b.hi);
         const device::clr_bins on_device{lo, hi, static_cast<float>(b.count) / (hi - lo), b.count};
-        for (const float x : edge_values(b)) EXPECT_EQ(device::clr_slot(on_device, x), slot(b, x)) << x << " in " << b.count << " bins";
+        for (const float x : edge_values(b))
+            EXPECT_EQ(device::clr_slot(on_device, x), slot(b, x)) << x << " in " << b.count << " bins";
     }
     EXPECT_EQ(slot(bins, std::nextafter(1.5f, 0.0f)), 1023u);
     EXPECT_EQ(std::floor((std::nextafter(1.5f, 0.0f) + 1.5f) * (1024 / 3.0f)), 1024);  // what the min is for
@@ -139,7 +154,8 @@ TEST(Histogram, parts_add_up_in_any_order) {
 
 TEST(Histogram, parts_that_do_not_belong_are_refused) {
     const Engine engine;
-    const auto part = [&](const Canonical& law, const Stream& stream, IndexRange range, Bins b, Precision p = Precision::single_precision) {
+    const auto part = [&](const Canonical& law, const Stream& stream, IndexRange range, Bins b,
+                          Precision p = Precision::single_precision) {
         return error_histogram(engine, law, stream, range, b, {.precision = p});
     };
     auto sum = part(wide, {1}, {0, 100}, bins);
@@ -156,7 +172,8 @@ TEST(Histogram, parts_that_do_not_belong_are_refused) {
 
 TEST(Histogram, a_batch_is_its_models_one_by_one) {
     std::vector<Canonical> laws;
-    for (std::uint64_t n = 1; n <= 300; ++n) laws.push_back(canonical({.mu = .5, .tau = 1, .sigma_m = .5, .sigma_t = .35, .n = n}));
+    for (std::uint64_t n = 1; n <= 300; ++n)
+        laws.push_back(canonical({.mu = .5, .tau = 1, .sigma_m = .5, .sigma_t = .35, .n = n}));
     for (const auto& shape : {all_shapes()[8], all_shapes()[9], all_shapes()[12]}) {
         const Engine engine(shape.options);
         const auto batch = error_histograms(engine, laws, {3, 10}, {5, 999}, bins);
@@ -165,7 +182,8 @@ TEST(Histogram, a_batch_is_its_models_one_by_one) {
             ASSERT_EQ(batch[j].total(), 999u);
             ASSERT_EQ(batch[j].stream.id, 10 + j);
             if (j % 50 == 0) {
-                ASSERT_EQ(row_of(batch[j]), host_row(laws[j], {3, static_cast<std::uint32_t>(10 + j)}, {5, 999}, bins)) << shape.name;
+                ASSERT_EQ(row_of(batch[j]), host_row(laws[j], {3, static_cast<std::uint32_t>(10 + j)}, {5, 999}, bins))
+                    << shape.name;
             }
         }
     }
@@ -195,8 +213,10 @@ TEST(Histogram, doubles_are_the_hosts) {
         ++want[x < -1.5 ? 1024u : x >= 1.5 ? 1025u : std::min(1023u, static_cast<unsigned>((x + 1.5) * (1024 / 3.0)))];
     }
     for (const auto& shape : {all_shapes()[0], all_shapes()[1], all_shapes()[8]})
-        EXPECT_EQ(row_of(error_histogram(Engine(shape.options), wide, {1}, {9, 20000}, bins, {.precision = Precision::double_precision})),
-                  want) << shape.name;
+        EXPECT_EQ(row_of(error_histogram(Engine(shape.options), wide, {1}, {9, 20000}, bins,
+                                         {.precision = Precision::double_precision})),
+                  want)
+            << shape.name;
 }
 
 TEST(Histogram, adds_to_the_callers_counters) {
@@ -224,12 +244,15 @@ TEST(Histogram, progress_is_told_and_can_cancel) {
     EXPECT_EQ(error_histogram(engine, wide, stream, {0, count}, {-2, 4, 64}, {.progress = note}).total(), count);
     EXPECT_EQ(seen, (std::vector<std::uint64_t>{0, std::uint64_t{1} << 28, count}));
     const auto stop = [](std::uint64_t done, std::uint64_t) { return done == 0; };
-    EXPECT_THROW(error_histogram(engine, wide, stream, {0, std::uint64_t{1} << 40}, {-2, 4, 64}, {.progress = stop}), Cancelled);
+    EXPECT_THROW(error_histogram(engine, wide, stream, {0, std::uint64_t{1} << 40}, {-2, 4, 64}, {.progress = stop}),
+                 Cancelled);
 }
 
 TEST(Histogram, bad_parameters_are_refused_by_name) {
     const Engine engine;
-    const auto call = [&](IndexRange range, Bins b, Stream stream = {1}) { error_histogram(engine, wide, stream, range, b); };
+    const auto call = [&](IndexRange range, Bins b, Stream stream = {1}) {
+        error_histogram(engine, wide, stream, range, b);
+    };
     refused("range", [&] { call({0, 0}, bins); });
     refused("range", [&] { call({end_of_stream - 1, 2}, bins); });
     refused("bins", [&] { call({0, 1}, {1, 1, 10}); });
@@ -255,20 +278,29 @@ TEST(Histogram, counts_catch_planted_faults) {
         const auto width = static_cast<std::uint64_t>(engine.width()), vectors = (first + count) / 2 / width + 1;
         RawKernel(engine, replaced(flatten_kernel("histogram"), from, to), "clr_histogram_errors",
                   "-DCLR_GENERATOR=CLR_PHILOX -DCLR_LOCAL_ROWS=0")
-            .arg(rows).arg(laws).arg(cl_ulong{0}).arg(cl_uint{1}).arg(device::clr_stream{1, 0, CLR_DOMAIN_ERROR})
-            .arg(device::clr_bins{-1.5f, 1.5f, 1024 / 3.0f, 1024}).arg(cl_ulong{first}).arg(cl_ulong{count}).arg(cl_ulong{0})
-            .arg(cl_ulong{vectors}).arg(cl_ulong{vectors}).local(4)
+            .arg(rows)
+            .arg(laws)
+            .arg(cl_ulong{0})
+            .arg(cl_uint{1})
+            .arg(device::clr_stream{1, 0, CLR_DOMAIN_ERROR})
+            .arg(device::clr_bins{-1.5f, 1.5f, 1024 / 3.0f, 1024})
+            .arg(cl_ulong{first})
+            .arg(cl_ulong{count})
+            .arg(cl_ulong{0})
+            .arg(cl_ulong{vectors})
+            .arg(cl_ulong{vectors})
+            .local(4)
             .run(1, 1);
         const auto got = contents<cl_uint>(rows);
         return Row(got.begin(), got.end()) == host_row(wide, {1}, {first, count}, bins);
     };
     EXPECT_TRUE(equal("kernel", "kernel"));
     EXPECT_FALSE(equal("position < top ? position : top", "position < top ? position + 1.0f : top"));  // off by one bin
-    EXPECT_FALSE(equal("i < queue.waiting", "i + 1 < queue.waiting"));                                  // a lost lane
-    EXPECT_FALSE(equal("to[1] = odd", "to[1] = even"));                                                 // half counted twice
-    EXPECT_FALSE(equal("#if !CLR_GROUPED\n    clr_count_waiting(queue, counters);", "#if 0\n"));         // the last step lost
-    EXPECT_FALSE(equal("(ulong)(at + i * step) < count", "at + i * step < (long)count"));                  // draws before the first
-    EXPECT_FALSE(equal("(float)(bins.count + CLR_OVERFLOW)", "(float)(bins.count - 1)"));               // clamped in
+    EXPECT_FALSE(equal("i < queue.waiting", "i + 1 < queue.waiting"));                                 // a lost lane
+    EXPECT_FALSE(equal("to[1] = odd", "to[1] = even"));                                                // half counted twice
+    EXPECT_FALSE(equal("#if !CLR_GROUPED\n    clr_count_waiting(queue, counters);", "#if 0\n"));       // the last step lost
+    EXPECT_FALSE(equal("(ulong)(at + i * step) < count", "at + i * step < (long)count"));  // draws before the first
+    EXPECT_FALSE(equal("(float)(bins.count + CLR_OVERFLOW)", "(float)(bins.count - 1)"));  // clamped in
 }
 
 TEST(Histogram, SlowMemoryDoesNotGrowWithTheSamples) {

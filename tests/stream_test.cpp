@@ -48,10 +48,12 @@ struct RawAnswer {
 
 // Random123's kat_vectors for philox4x32 10, and every line of pcg4d3x_kat.txt.
 std::vector<RawAnswer> raw_answers() {
-    std::vector<RawAnswer> all{
-        {{0, 0, 0, 0}, {0x6627e8d5, 0xe169c58d, 0xbc57ac4c, 0x9b00dbd8}, {0, 0}, true},
-        {{~0u, ~0u, ~0u, ~0u}, {0x408f276d, 0x41c83b0e, 0xa20bc7c6, 0x6d5451fd}, {~0u, ~0u}, true},
-        {{0x243f6a88, 0x85a308d3, 0x13198a2e, 0x03707344}, {0xd16cfe09, 0x94fdcceb, 0x5001e420, 0x24126ea1}, {0xa4093822, 0x299f31d0}, true}};
+    std::vector<RawAnswer> all{{{0, 0, 0, 0}, {0x6627e8d5, 0xe169c58d, 0xbc57ac4c, 0x9b00dbd8}, {0, 0}, true},
+                               {{~0u, ~0u, ~0u, ~0u}, {0x408f276d, 0x41c83b0e, 0xa20bc7c6, 0x6d5451fd}, {~0u, ~0u}, true},
+                               {{0x243f6a88, 0x85a308d3, 0x13198a2e, 0x03707344},
+                                {0xd16cfe09, 0x94fdcceb, 0x5001e420, 0x24126ea1},
+                                {0xa4093822, 0x299f31d0},
+                                true}};
     for (const auto& line : lines("pcg4d3x_kat.txt")) {
         std::istringstream in(line);
         const auto v = numbers<std::uint32_t>(in, 8);
@@ -73,8 +75,8 @@ std::vector<LayoutAnswer> layout_answers() {
         std::string generator;
         in >> generator;
         const auto v = numbers<std::uint64_t>(in, 4);
-        const Stream stream{v[0], static_cast<std::uint32_t>(v[1]), generator == "philox" ? Generator::philox : Generator::pcg4d3x,
-                            static_cast<Domain>(v[2])};
+        const Stream stream{v[0], static_cast<std::uint32_t>(v[1]),
+                            generator == "philox" ? Generator::philox : Generator::pcg4d3x, static_cast<Domain>(v[2])};
         all.push_back({stream, v[3], numbers<std::uint32_t>(in, 4)});
     }
     return all;
@@ -168,7 +170,8 @@ TEST(Stream, a_users_kernel_gives_the_known_answers_at_every_width) {
             const auto in = Buffer::from_host(engine, std::as_bytes(std::span(a.in)));
             const Buffer out(engine, sizeof(Words));
             kernel.arg(in).arg(out).arg(a.key[0]).arg(a.key[1]).arg(cl_uint{a.philox}).run(1, 1);
-            EXPECT_EQ(contents<std::uint32_t>(out), std::vector<std::uint32_t>(a.out.begin(), a.out.end())) << "width " << width;
+            EXPECT_EQ(contents<std::uint32_t>(out), std::vector<std::uint32_t>(a.out.begin(), a.out.end()))
+                << "width " << width;
         }
     }
 }
@@ -183,8 +186,9 @@ TEST(Stream, layout_gives_the_known_answers) {
             EXPECT_EQ(device, a.words) << a.block;
         } else {
             host = {};
-            for (const std::uint32_t w : words(device::clr_draw(static_cast<std::uint32_t>(a.stream.generator),
-                                                                {a.stream.seed, a.stream.id, static_cast<std::uint32_t>(a.stream.domain)}, a.block)))
+            for (const std::uint32_t w :
+                 words(device::clr_draw(static_cast<std::uint32_t>(a.stream.generator),
+                                        {a.stream.seed, a.stream.id, static_cast<std::uint32_t>(a.stream.domain)}, a.block)))
                 host.push_back(w);
         }
         EXPECT_EQ(host, a.words) << a.block;
@@ -193,7 +197,8 @@ TEST(Stream, layout_gives_the_known_answers) {
 
 TEST(Stream, domains_ids_and_seeds_share_no_numbers) {
     for (const auto generator : {Generator::philox, Generator::pcg4d3x})
-        for (const Stream& other : {Stream{2, 0, generator}, Stream{1, 1, generator}, Stream{1, 0, generator, Domain::error}})
+        for (const Stream& other :
+             {Stream{2, 0, generator}, Stream{1, 1, generator}, Stream{1, 0, generator, Domain::error}})
             for (std::uint64_t i = 0; i < 64; ++i) EXPECT_NE(word({1, 0, generator}, i), word(other, i));
 }
 
@@ -274,7 +279,9 @@ TEST(Stream, double_quantile_is_the_vectors_erfcinv) {
         const auto h = static_cast<std::uint64_t>((k - 1) / 2);
         if (2 * static_cast<double>(h) + 1 != k) continue;  // only tail probabilities that a word pair can hold
         const double want = 1.4142135623730951 * v["erfcinv"].get<double>();
-        EXPECT_NEAR(device::clr_normal_double(static_cast<std::uint32_t>(h), static_cast<std::uint32_t>(h >> 32)), -want, 2e-15 * want) << v;
+        EXPECT_NEAR(device::clr_normal_double(static_cast<std::uint32_t>(h), static_cast<std::uint32_t>(h >> 32)), -want,
+                    2e-15 * want)
+            << v;
     }
 }
 
@@ -340,7 +347,9 @@ TEST(Stream, bad_arguments_are_refused_by_name) {
         try {
             call();
             ADD_FAILURE() << name << " was accepted";
-        } catch (const InvalidArgument& e) { EXPECT_EQ(e.name, name) << e.what(); }
+        } catch (const InvalidArgument& e) {
+            EXPECT_EQ(e.name, name) << e.what();
+        }
     };
     refused("seed", [&] { fill_normals(engine, {1ull << 32, 0, Generator::pcg4d3x}, 0, out); });
     refused("domain", [&] { fill_normals(engine, {1, 0, Generator::philox, static_cast<Domain>(16)}, 0, out); });
@@ -360,10 +369,15 @@ TEST(Stream, bit_comparison_catches_planted_faults) {
         constexpr std::uint64_t count = 2048;
         const Buffer out(engine, count * (doubles ? 8 : 4));
         const std::uint64_t per_block = doubles ? 2 : 4, blocks = count / per_block;
-        RawKernel(engine, replaced(flatten_kernel("stream"), from, to), doubles ? "clr_fill_normals_double" : "clr_fill_normals",
-                  "-DCLR_GENERATOR=CLR_PHILOX")
-            .arg(out).arg(device::clr_layout{0, 1, 1}).arg(device::clr_stream{1, 0, 0}).arg(cl_ulong{first}).arg(cl_ulong{count})
-            .arg(cl_ulong{first / per_block}).arg(device::clr_range{blocks, blocks / static_cast<std::uint64_t>(engine.width())})
+        RawKernel(engine, replaced(flatten_kernel("stream"), from, to),
+                  doubles ? "clr_fill_normals_double" : "clr_fill_normals", "-DCLR_GENERATOR=CLR_PHILOX")
+            .arg(out)
+            .arg(device::clr_layout{0, 1, 1})
+            .arg(device::clr_stream{1, 0, 0})
+            .arg(cl_ulong{first})
+            .arg(cl_ulong{count})
+            .arg(cl_ulong{first / per_block})
+            .arg(device::clr_range{blocks, blocks / static_cast<std::uint64_t>(engine.width())})
             .run(1, 1);
         if (!doubles) return !same_bits(contents<float>(out), host_normals({1}, first, count));
         std::vector<double> want(count);

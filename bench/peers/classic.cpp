@@ -11,11 +11,11 @@
 namespace peers {
 namespace {
 
-template <class Work>
-void on_all_cores(std::size_t count, Work work) {
+template <class Work> void on_all_cores(std::size_t count, Work work) {
     const std::size_t threads = std::max(1u, std::thread::hardware_concurrency()), each = (count + threads - 1) / threads;
     std::vector<std::jthread> pool;
-    for (std::size_t t = 0; t < threads; ++t) pool.emplace_back(work, t, std::min(count, t * each), std::min(count, (t + 1) * each));
+    for (std::size_t t = 0; t < threads; ++t)
+        pool.emplace_back(work, t, std::min(count, t * each), std::min(count, (t + 1) * each));
 }
 
 struct FloatLaw {

@@ -11,8 +11,7 @@ namespace {
 constexpr std::uint64_t step = 32;
 
 /// Calls work(thread, first, count) for parts of a multiple of `step`, each on its own thread.
-template <class Work>
-void on_all_cores(std::uint64_t count, Work work) {
+template <class Work> void on_all_cores(std::uint64_t count, Work work) {
     const std::uint64_t threads = std::max(1u, std::thread::hardware_concurrency());
     const std::uint64_t each = (count / step + threads - 1) / threads * step;
     std::vector<std::jthread> pool;
@@ -37,8 +36,8 @@ void native_samples(const NativeSet& set, const clratio::Canonical& law, const c
     });
 }
 
-void native_histogram(const NativeSet& set, const clratio::Canonical& law, const clratio::Stream& stream, std::uint64_t first,
-                      std::uint64_t count, Binning binning, std::span<std::uint64_t> totals) {
+void native_histogram(const NativeSet& set, const clratio::Canonical& law, const clratio::Stream& stream,
+                      std::uint64_t first, std::uint64_t count, Binning binning, std::span<std::uint64_t> totals) {
     std::mutex mutex;
     on_all_cores(count, [&](std::uint64_t begin, std::uint64_t part) {
         std::vector<std::uint32_t> row(binning.bins + 3);

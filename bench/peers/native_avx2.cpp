@@ -50,7 +50,8 @@ struct V {
 
     static void store_slots(F x, const Binning& b, std::uint32_t* slot) {
         const F lo = set(b.lo), hi = set(b.hi);
-        const F under = _mm256_cmp_ps(x, lo, _CMP_LT_OQ), over = _mm256_cmp_ps(x, hi, _CMP_GE_OQ), nan = _mm256_cmp_ps(x, x, _CMP_UNORD_Q);
+        const F under = _mm256_cmp_ps(x, lo, _CMP_LT_OQ), over = _mm256_cmp_ps(x, hi, _CMP_GE_OQ),
+                nan = _mm256_cmp_ps(x, x, _CMP_UNORD_Q);
         const F u = _mm256_min_ps(mul(sub(x, lo), set(b.inverse_width)), set(static_cast<float>(b.bins - 1)));
         F s = from_bits(_mm256_cvttps_epi32(u));
         s = _mm256_blendv_ps(s, from_bits(set_word(b.bins)), under);

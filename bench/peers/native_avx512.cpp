@@ -45,7 +45,8 @@ struct V {
 
     static void store_slots(F x, const Binning& b, std::uint32_t* slot) {
         const F lo = set(b.lo), hi = set(b.hi);
-        const __mmask16 not_under = _mm512_cmp_ps_mask(x, lo, _CMP_GE_OQ), inside = _mm512_mask_cmp_ps_mask(not_under, x, hi, _CMP_LT_OQ);
+        const __mmask16 not_under = _mm512_cmp_ps_mask(x, lo, _CMP_GE_OQ),
+                        inside = _mm512_mask_cmp_ps_mask(not_under, x, hi, _CMP_LT_OQ);
         const __mmask16 under = _mm512_cmp_ps_mask(x, lo, _CMP_LT_OQ), over = _mm512_cmp_ps_mask(x, hi, _CMP_GE_OQ);
         const F u = _mm512_min_ps(mul(sub(x, lo), set(b.inverse_width)), set(static_cast<float>(b.bins - 1)));
         U s = _mm512_mask_cvttps_epi32(set_word(b.bins + 2), inside, u);

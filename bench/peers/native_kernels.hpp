@@ -7,8 +7,7 @@
 
 namespace peers {
 
-template <class V>
-struct NativeKernels {
+template <class V> struct NativeKernels {
     using F = typename V::F;
     using U = typename V::U;
     struct Fraction {
@@ -24,7 +23,8 @@ struct NativeKernels {
 
     static Fraction normal(U h) {
         const U twice_j = V::template shift_left<1>(V::bit_xor(h, V::template shift_right_signed<31>(h)));
-        const F p = V::from_unsigned(V::bit_or(twice_j, V::set_word(1))), x = V::from_unsigned(V::and_not(twice_j, V::set_word(~0u)));
+        const F p = V::from_unsigned(V::bit_or(twice_j, V::set_word(1))),
+                x = V::from_unsigned(V::and_not(twice_j, V::set_word(~0u)));
         const U bits = V::bits(V::mul(p, V::sub(V::set(0x1p33f), p)));
         const F linear = V::from_signed(V::sub(V::set_word((127u + 64u) << 23), bits));
         const F m = V::from_bits(V::bit_or(V::bit_and(bits, V::set_word(0x007fffffu)), V::set_word(0x3f800000u)));
@@ -93,15 +93,14 @@ struct NativeKernels {
         return v;
     }
 
-    template <clratio::Generator generator>
-    static Words draw(const clratio::Stream& stream, std::uint64_t block) {
+    template <clratio::Generator generator> static Words draw(const clratio::Stream& stream, std::uint64_t block) {
         if constexpr (generator == clratio::Generator::philox) return philox(stream, block);
         return pcg4d3x(stream, block);
     }
 
     template <clratio::Generator generator, class Take>
-    static void each(clratio::device::clr_canonical law, const clratio::Stream& stream, std::uint64_t first, std::uint64_t count,
-                     Take take) {
+    static void each(clratio::device::clr_canonical law, const clratio::Stream& stream, std::uint64_t first,
+                     std::uint64_t count, Take take) {
         const Law wide{V::set(law.s), V::set(law.a), V::set(law.b)};
         for (std::uint64_t i = 0; i < count; i += 2 * V::lane_count) {
             const Words w = draw<generator>(stream, (first + i) / 2);
@@ -110,8 +109,8 @@ struct NativeKernels {
     }
 
     template <class Take>
-    static void each(clratio::device::clr_canonical law, const clratio::Stream& stream, std::uint64_t first, std::uint64_t count,
-                     Take take) {
+    static void each(clratio::device::clr_canonical law, const clratio::Stream& stream, std::uint64_t first,
+                     std::uint64_t count, Take take) {
         if (stream.generator == clratio::Generator::philox)
             each<clratio::Generator::philox>(law, stream, first, count, take);
         else
@@ -123,8 +122,8 @@ struct NativeKernels {
         each(law, stream, first, count, [out](std::uint64_t i, F even, F odd) { V::store_in_turn(even, odd, out + i); });
     }
 
-    static void histogram(clratio::device::clr_canonical law, clratio::Stream stream, std::uint64_t first, std::uint64_t count,
-                          Binning b, std::uint32_t* row) {
+    static void histogram(clratio::device::clr_canonical law, clratio::Stream stream, std::uint64_t first,
+                          std::uint64_t count, Binning b, std::uint32_t* row) {
         // The slots of one step are counted in the next, when they have left the store buffer.
         constexpr std::size_t step = 2 * V::lane_count;
         alignas(64) std::uint32_t slot[2 * step];

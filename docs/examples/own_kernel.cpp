@@ -31,7 +31,8 @@ int main() {
     const char* strings = text.c_str();
     const cl_device_id device = engine.device();
     cl_program program = clCreateProgramWithSource(engine.context(), 1, &strings, nullptr, nullptr);
-    if (clBuildProgram(program, 1, &device, "-cl-std=CL1.2 -DCLR_WIDTH=4 -DCLR_GROUPED=0 -DCLR_FP64=0", nullptr, nullptr) != CL_SUCCESS)
+    if (clBuildProgram(program, 1, &device, "-cl-std=CL1.2 -DCLR_WIDTH=4 -DCLR_GROUPED=0 -DCLR_FP64=0", nullptr, nullptr) !=
+        CL_SUCCESS)
         return 1;
     cl_kernel kernel = clCreateKernel(program, "count_inside", nullptr);
 
@@ -44,7 +45,8 @@ int main() {
     clSetKernelArg(kernel, 1, sizeof seed, &seed);
     clSetKernelArg(kernel, 2, sizeof blocks, &blocks);
     clEnqueueNDRangeKernel(engine.queue(), kernel, 1, nullptr, &work_items, nullptr, 0, nullptr, nullptr);
-    clEnqueueReadBuffer(engine.queue(), buffer, CL_TRUE, 0, work_items * sizeof(cl_uint), inside.data(), 0, nullptr, nullptr);
+    clEnqueueReadBuffer(engine.queue(), buffer, CL_TRUE, 0, work_items * sizeof(cl_uint), inside.data(), 0, nullptr,
+                        nullptr);
 
     // The same draws one by one on the host.
     unsigned long long on_device = 0, on_host = 0;
@@ -54,8 +56,8 @@ int main() {
         const float x = clratio::uniform({.seed = seed}, 2 * i), y = clratio::uniform({.seed = seed}, 2 * i + 1);
         on_host += x * x + y * y < 1.0f;
     }
-    std::printf("pi is about %.4f; device and host counted %llu and %llu\n", 4.0 * static_cast<double>(on_device) / static_cast<double>(points),
-                on_device, on_host);
+    std::printf("pi is about %.4f; device and host counted %llu and %llu\n",
+                4.0 * static_cast<double>(on_device) / static_cast<double>(points), on_device, on_host);
     clReleaseMemObject(buffer);
     clReleaseKernel(kernel);
     clReleaseProgram(program);

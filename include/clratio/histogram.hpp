@@ -13,8 +13,8 @@
 
 namespace clratio {
 
-/// `count` half-open bins on [lo, hi). Ranges: lo < hi, both and count / (hi - lo) finite as float (as double for double samples),
-/// 1 <= count <= 2^23. A value x is in the bin of device::clr_slot.
+/// `count` half-open bins on [lo, hi). Ranges: lo < hi, both and count / (hi - lo) finite as float (as double for double
+/// samples), 1 <= count <= 2^23. A value x is in the bin of device::clr_slot.
 struct Bins {
     double lo = -1, hi = 1;
     std::uint32_t count = 1024;
@@ -55,24 +55,25 @@ struct ErrorHistogram : Histogram {
 
 struct HistogramOptions {
     Precision precision = Precision::single_precision;
-    Progress progress = {};  ///< called between launches with samples done and to do; Cancelled is thrown where it returns false
+    Progress progress =
+        {};  ///< called between launches with samples done and to do; Cancelled is thrown where it returns false
 };
 
 /// Histograms of the samples `range` of each law, as error_samples() gives them; law j draws from stream id stream.id + j.
-/// Blocking. Any 64-bit count: the library splits it into launches of at most 2^28 samples. Memory: 4 bytes for each counter of at
-/// most 16 MiB of partial rows, 8 bytes for each counter of the result; it does not grow with the number of samples.
-/// NaN and infinities: see Histogram. Errors: InvalidArgument, before anything is enqueued, for a law, bins, stream, an empty range,
-/// one that ends after 2^60, stream ids beyond 2^32, results that no allocation holds. Determinism: the same counts at every width,
-/// path, work size and split into ranges. Source: supplement eq. (14); bins: docs/streams.md.
+/// Blocking. Any 64-bit count: the library splits it into launches of at most 2^28 samples. Memory: 4 bytes for each counter
+/// of at most 16 MiB of partial rows, 8 bytes for each counter of the result; it does not grow with the number of samples.
+/// NaN and infinities: see Histogram. Errors: InvalidArgument, before anything is enqueued, for a law, bins, stream, an
+/// empty range, one that ends after 2^60, stream ids beyond 2^32, results that no allocation holds. Determinism: the same
+/// counts at every width, path, work size and split into ranges. Source: supplement eq. (14); bins: docs/streams.md.
 ErrorHistogram error_histogram(const Engine& engine, const Canonical& law, const Stream& stream, IndexRange range, Bins bins,
                                const HistogramOptions& options = {});
 std::vector<ErrorHistogram> error_histograms(const Engine& engine, std::span<const Canonical> laws, const Stream& stream,
                                              IndexRange range, Bins bins, const HistogramOptions& options = {});
 
-/// The same, added to the caller's counters: a row of bins.count + 3 for each law, the bins, then underflow, overflow, nonfinite.
-/// After an exception the counters hold a part of the samples.
-void add_error_counts(const Engine& engine, std::span<const Canonical> laws, const Stream& stream, IndexRange range, Bins bins,
-                      std::span<std::uint64_t> rows, const HistogramOptions& options = {});
+/// The same, added to the caller's counters: a row of bins.count + 3 for each law, the bins, then underflow, overflow,
+/// nonfinite. After an exception the counters hold a part of the samples.
+void add_error_counts(const Engine& engine, std::span<const Canonical> laws, const Stream& stream, IndexRange range,
+                      Bins bins, std::span<std::uint64_t> rows, const HistogramOptions& options = {});
 
 /// The histogram of values. Blocking; the device form starts after wait_list. Errors: InvalidArgument for bins or a view.
 Histogram histogram(const Engine& engine, std::span<const float> values, Bins bins);

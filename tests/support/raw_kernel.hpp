@@ -18,8 +18,9 @@ public:
         : engine_(engine) {
         const char* text = source.c_str();
         program_ = Program(clCreateProgramWithSource(engine.context(), 1, &text, nullptr, nullptr));
-        const std::string all = "-cl-std=CL1.2 -cl-fp32-correctly-rounded-divide-sqrt -DCLR_WIDTH=" + std::to_string(engine.width()) +
-                                " -DCLR_GROUPED=" + (engine.grouped() ? "1" : "0") + " -DCLR_FP64=1 " + options;
+        const std::string all =
+            "-cl-std=CL1.2 -cl-fp32-correctly-rounded-divide-sqrt -DCLR_WIDTH=" + std::to_string(engine.width()) +
+            " -DCLR_GROUPED=" + (engine.grouped() ? "1" : "0") + " -DCLR_FP64=1 " + options;
         const cl_device_id device = engine.device();
         if (clBuildProgram(program_.get(), 1, &device, all.c_str(), nullptr, nullptr) != CL_SUCCESS) {
             std::string log(100000, '\0');
@@ -40,7 +41,8 @@ public:
     }
 
     void run(std::size_t global, std::size_t group) {
-        check(clEnqueueNDRangeKernel(engine_.queue(), kernel_.get(), 1, nullptr, &global, &group, 0, nullptr, nullptr), "enqueue");
+        check(clEnqueueNDRangeKernel(engine_.queue(), kernel_.get(), 1, nullptr, &global, &group, 0, nullptr, nullptr),
+              "enqueue");
         check(clFinish(engine_.queue()), "clFinish");
         next_ = 0;
     }

@@ -1,5 +1,5 @@
-// Samples of the error of an estimator, eq. (14), from four-word blocks: sample i of a float stream is made of its words 2 i (z1)
-// and 2 i + 1 (z2), sample i of a double stream of its words 4 i, 4 i + 1 (z1) and 4 i + 2, 4 i + 3 (z2).
+// Samples of the error of an estimator, eq. (14), from four-word blocks: sample i of a float stream is made of its words 2 i
+// (z1) and 2 i + 1 (z2), sample i of a double stream of its words 4 i, 4 i + 1 (z1) and 4 i + 2, 4 i + 3 (z2).
 #ifndef CLRATIO_DEVICE_ERROR_H
 #define CLRATIO_DEVICE_ERROR_H
 

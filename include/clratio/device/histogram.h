@@ -18,15 +18,16 @@ typedef struct {
 #define CLR_NONFINITE 2u  // NaN
 #define CLR_OUTER_SLOTS 3u
 
-// x in [lo, hi) is in bin min(count - 1, floor((x - lo) inverse_width)), each step rounded: without the min, the value next to hi
-// can land in bin `count`. The slot is built as a number: its conversion to an integer is in range whatever x is.
+// x in [lo, hi) is in bin min(count - 1, floor((x - lo) inverse_width)), each step rounded: without the min, the value next
+// to hi can land in bin `count`. The slot is built as a number: its conversion to an integer is in range whatever x is.
 CLR_FN clr_uint clr_slot(clr_bins bins, clr_real x) {
     const clr_real lo = (clr_real)(bins.lo), hi = (clr_real)(bins.hi);
     const clr_real top = (clr_real)((float)(bins.count - 1));
     const clr_real position = (x - lo) * (clr_real)(bins.inverse_width);
     const clr_real bin = position < top ? position : top;
     const clr_real below_hi = x < hi ? bin : (clr_real)((float)(bins.count + CLR_OVERFLOW));
-    const clr_real outside = x < lo ? (clr_real)((float)(bins.count + CLR_UNDERFLOW)) : (clr_real)((float)(bins.count + CLR_NONFINITE));
+    const clr_real outside =
+        x < lo ? (clr_real)((float)(bins.count + CLR_UNDERFLOW)) : (clr_real)((float)(bins.count + CLR_NONFINITE));
     return clr_to_uint(clr_to_int(x >= lo ? below_hi : outside));
 }
 

@@ -1,5 +1,5 @@
-// From hashed words to uniform and standard normal numbers. All maps are open (0, 1, -inf and +inf never come out) and symmetric:
-// the complement ~h of a word gives 1 - u and -z, exactly.
+// From hashed words to uniform and standard normal numbers. All maps are open (0, 1, -inf and +inf never come out) and
+// symmetric: the complement ~h of a word gives 1 - u and -z, exactly.
 #ifndef CLRATIO_DEVICE_QUANTILE_H
 #define CLRATIO_DEVICE_QUANTILE_H
 
@@ -18,10 +18,10 @@ typedef struct {
     clr_real n, d;
 } clr_fraction;
 
-// -log of u 2^-64, for 2^-64 <= u <= 2^64; absolute error below 2.5e-7 + 2^-23 of the result. The bits of u, read as an integer,
-// are 2^23 (exponent + mantissa - 1): a piecewise linear log2. What is left of the log, log(2) (m - 1) - log m for a mantissa m in
-// [1, 2), is small: a minimax polynomial of degree 7 in m - 3/2, 1.9e-7 from the truth. Measured: 4 % of a sample's whole cost less
-// than splitting off the exponent.
+// -log of u 2^-64, for 2^-64 <= u <= 2^64; absolute error below 2.5e-7 + 2^-23 of the result. The bits of u, read as an
+// integer, are 2^23 (exponent + mantissa - 1): a piecewise linear log2. What is left of the log, log(2) (m - 1) - log m for
+// a mantissa m in [1, 2), is small: a minimax polynomial of degree 7 in m - 3/2, 1.9e-7 from the truth. Measured: 4 % of a
+// sample's whole cost less than splitting off the exponent.
 CLR_FN clr_real clr_minus_log_scaled(clr_real u) {
     const clr_uint bits = clr_bits(u);
     const clr_real linear = clr_to_real(clr_to_int((clr_uint)((127u + 64u) << 23) - bits));
@@ -104,14 +104,17 @@ CLR_FN clr_double clr_minus_log_double(clr_double p) {
     return clr_fma(clr_to_double(e), (clr_double)(0.69314718055994531), -log_m);
 }
 
-#define CLR_HORNER_7(r, c7, c6, c5, c4, c3, c2, c1, c0)                                                              \
-    clr_fma(clr_fma(clr_fma(clr_fma(clr_fma(clr_fma(clr_fma((clr_double)(c7), r, (clr_double)(c6)), r, (clr_double)(c5)), r, \
-                                            (clr_double)(c4)), r, (clr_double)(c3)), r, (clr_double)(c2)), r,       \
-                    (clr_double)(c1)), r, (clr_double)(c0))
+#define CLR_HORNER_7(r, c7, c6, c5, c4, c3, c2, c1, c0)                                                                     \
+    clr_fma(clr_fma(clr_fma(clr_fma(clr_fma(clr_fma(clr_fma((clr_double)(c7), r, (clr_double)(c6)), r, (clr_double)(c5)),   \
+                                            r, (clr_double)(c4)),                                                           \
+                                    r, (clr_double)(c3)),                                                                   \
+                            r, (clr_double)(c2)),                                                                           \
+                    r, (clr_double)(c1)),                                                                                   \
+            r, (clr_double)(c0))
 
-// The quantile at (h + 1/2) 2^-64 of two words: p = (2 j + 1) 2^-65 <= 1/2; |z| from 6.8e-20 to 9.155, within 2e-15 relative.
-// Source: Wichura, Algorithm AS 241, PPND16 (Applied Statistics 37, 1988): q A / B for |q| = |p - 1/2| <= 0.425, else C / D
-// or E / F in r = sqrt(-log p).
+// The quantile at (h + 1/2) 2^-64 of two words: p = (2 j + 1) 2^-65 <= 1/2; |z| from 6.8e-20 to 9.155, within 2e-15
+// relative. Source: Wichura, Algorithm AS 241, PPND16 (Applied Statistics 37, 1988): q A / B for |q| = |p - 1/2| <= 0.425,
+// else C / D or E / F in r = sqrt(-log p).
 CLR_FN clr_fraction_double clr_normal_fraction_double(clr_uint low, clr_uint high) {
     const clr_wide h = clr_to_wide(high) << 32 | clr_to_wide(low);
     const clr_wide upper_half = (clr_wide)(0u) - (h >> 63);
