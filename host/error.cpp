@@ -4,7 +4,8 @@
 #include <string>
 #include <utility>
 
-#include "clratio/exception.hpp"
+#include "clratio/device/error.h"
+#include "draws.hpp"
 
 namespace clratio {
 namespace {
@@ -54,6 +55,86 @@ device::clr_canonical to_float(const Canonical& c) {
     for (const auto& [name, value] : {std::pair{"s", f.s}, {"a", f.a}, {"b", f.b}})
         require(std::isfinite(value), name, "a number that float can hold", value);
     return f;
+}
+
+void check_law(const Canonical& c) {
+    require(std::isfinite(c.s) && c.s >= 0, "s", "a finite number >= 0", c.s);
+    require(std::isfinite(c.a), "a", "a finite number", c.a);
+    require(std::isfinite(c.b) && c.b >= 0, "b", "a finite number >= 0", c.b);
+}
+
+device::clr_stream error_stream(Stream stream) {
+    stream.domain = Domain::error;
+    return device_stream(stream);
+}
+
+namespace {
+
+template <class Law>
+cl_event samples(const Engine& engine, const char* kernel, const Law& law, const BlockRange& blocks, const Stream& stream,
+                 std::uint64_t first, View out, std::span<const cl_event> wait_list) {
+    return Launch(engine, "error", kernel, generator_option(stream.generator))
+        .view(out)
+        .arg(law)
+        .arg(error_stream(stream))
+        .arg(cl_ulong{first})
+        .arg(cl_ulong{out.count})
+        .arg(cl_ulong{blocks.first})
+        .after(wait_list)
+        .run_ranges(blocks.count)
+        .give();
+}
+
+device::clr_words block(const Stream& stream, std::uint64_t block) {
+    return device::clr_draw(static_cast<std::uint32_t>(stream.generator), error_stream(stream), block);
+}
+
+}  // namespace
+
+cl_event error_samples(const Engine& engine, const Canonical& law, const Stream& stream, std::uint64_t first, View out,
+                       std::span<const cl_event> wait_list) {
+    check_law(law);
+    check_range(first, out.count);
+    check_output(out, sizeof(float));
+    const auto blocks = blocks_of(first, std::max<std::uint64_t>(1, out.count), 2, engine.width());
+    return samples(engine, "clr_error_samples", to_float(law), blocks, stream, first, out, wait_list);
+}
+
+cl_event error_samples_double(const Engine& engine, const Canonical& law, const Stream& stream, std::uint64_t first,
+                              View out, std::span<const cl_event> wait_list) {
+    check_law(law);
+    require_fp64(engine, "double samples");
+    check_range(first, out.count);
+    check_output(out, sizeof(double));
+    const auto blocks = blocks_of(first, std::max<std::uint64_t>(1, out.count), 1, engine.width());
+    return samples(engine, "clr_error_samples_double", law, blocks, stream, first, out, wait_list);
+}
+
+void error_samples(const Engine& engine, const Canonical& law, const Stream& stream, std::uint64_t first,
+                   std::span<float> out) {
+    fill_in_parts(engine, first, out,
+                  [&](View part, std::uint64_t at) { return error_samples(engine, law, stream, at, part); });
+}
+
+void error_samples(const Engine& engine, const Canonical& law, const Stream& stream, std::uint64_t first,
+                   std::span<double> out) {
+    fill_in_parts(engine, first, out,
+                  [&](View part, std::uint64_t at) { return error_samples_double(engine, law, stream, at, part); });
+}
+
+float error_sample(const Canonical& law, const Stream& stream, std::uint64_t index) {
+    check_law(law);
+    check_range(index, 1);
+    const auto w = block(stream, index / 2);
+    return index % 2 ? device::clr_error_sample(to_float(law), w.w2, w.w3)
+                     : device::clr_error_sample(to_float(law), w.w0, w.w1);
+}
+
+double error_sample_double(const Canonical& law, const Stream& stream, std::uint64_t index) {
+    check_law(law);
+    check_range(index, 1);
+    const auto w = block(stream, index);
+    return device::clr_error_sample_double(law, w.w0, w.w1, w.w2, w.w3);
 }
 
 }  // namespace clratio

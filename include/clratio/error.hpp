@@ -2,8 +2,10 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 
 #include "clratio/device/canonical.h"
+#include "clratio/stream.hpp"
 
 namespace clratio {
 
@@ -31,5 +33,26 @@ Canonical monte_carlo_canonical(const ErrorModel& model);
 
 /// Rounded to float for kernels. Errors: InvalidArgument where float overflows.
 device::clr_canonical to_float(const Canonical& c);
+
+/// Error samples first, first + 1, .. of a law: canonical(model) or monte_carlo_canonical(model). Sample i is made of normal
+/// draws 2 i (Z1) and 2 i + 1 (Z2) of the stream in the domain `error`, whatever stream.domain says; the double forms use
+/// normal_double draws. Units: those of m. A sample is infinite, or NaN, where its denominator 1 + s Z2 is 0. Error bound:
+/// the quantiles' (stream.hpp) and five roundings. Errors: InvalidArgument for a law, stream, range or view out of range,
+/// and doubles without fp64. Cost: the bytes of out. Determinism: the same bits at every width, work size and split, and on
+/// the host (error_sample). Source: supplement eq. (14).
+void error_samples(const Engine& engine, const Canonical& law, const Stream& stream, std::uint64_t first,
+                   std::span<float> out);
+void error_samples(const Engine& engine, const Canonical& law, const Stream& stream, std::uint64_t first,
+                   std::span<double> out);
+
+/// The same to device memory: enqueued after wait_list, nothing waits; the caller releases the event.
+cl_event error_samples(const Engine& engine, const Canonical& law, const Stream& stream, std::uint64_t first, View out,
+                       std::span<const cl_event> wait_list = {});
+cl_event error_samples_double(const Engine& engine, const Canonical& law, const Stream& stream, std::uint64_t first,
+                              View out, std::span<const cl_event> wait_list = {});
+
+/// Sample `index` alone, on the host.
+float error_sample(const Canonical& law, const Stream& stream, std::uint64_t index);
+double error_sample_double(const Canonical& law, const Stream& stream, std::uint64_t index);
 
 }  // namespace clratio
