@@ -1,0 +1,50 @@
+#!/usr/bin/env bash
+# Everything a change must pass: formatting, a build without warnings, the tests. Ends with "N passed, N failed".
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+. tools/packages.sh
+
+build="build-check"
+
+# format: tells whether all tracked sources are formatted as .clang-format says.
+format() {
+    local files
+    mapfile -t files < <(git ls-files '*.cpp' '*.hpp' '*.h' '*.cl')
+    clang-format-14 --dry-run -Werror "${files[@]}"
+}
+
+# count ATTRIBUTE: of the <testsuite> in ctest's report.
+count() { sed -n '/<testsuite/,/>/s/.*[[:space:]]'"$1"'="\([0-9]*\)".*/\1/p' "$build/tests.xml" | head -n 1; }
+
+install_missing "${build_packages[@]}" "${test_packages[@]}" "${bench_packages[@]}"
+
+failed=0
+echo "Formatting ..."
+format || {
+    echo "These files are not formatted: clang-format-14 -i FILE"
+    failed=1
+}
+
+echo "Building in $build with warnings as errors ..."
+configure "$build" -DCLRATIO_WERROR=ON -DCLRATIO_IO=ON -DCLRATIO_TOOL=ON -DCLRATIO_TESTS=ON -DCLRATIO_BENCH=ON \
+    -DCLRATIO_INSTALL=ON
+quietly "$build/build.log" cmake --build "$build" --parallel "$(nproc)"
+
+echo "Testing on PoCL ..."
+export CLRATIO_DEVICE=${CLRATIO_DEVICE:-cpu}
+mkdir -p "$build/pocl_cache"
+rm -f "$build/tests.xml"
+ctest --test-dir "$build" --label-exclude '^slow$' --output-on-failure --output-junit tests.xml --parallel "$(nproc)" \
+    --progress </dev/null || true
+[[ -s $build/tests.xml ]] || {
+    echo "ctest wrote no report" >&2
+    exit 1
+}
+
+failures=$(count failures) total=$(count tests) disabled=$(count disabled) skipped=$(count skipped)
+passed=$((total - failures - disabled - skipped))
+failed=$((failed + failures))
+((skipped + disabled == 0)) || echo "$((skipped + disabled)) skipped"
+echo "The slow statistics are left out here: ctest --test-dir $build --label-regex slow --output-on-failure"
+echo "$passed passed, $failed failed"
+((failed == 0 && passed > 0))
