@@ -2,7 +2,7 @@
 # Everything a change must pass: formatting, a build without warnings, the tests. Ends with "N passed, N failed".
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-. tools/packages.sh
+. tools/setup.sh
 
 build="build-check"
 
@@ -32,7 +32,7 @@ quietly "$build/build.log" cmake --build "$build" --parallel "$(nproc)"
 
 echo "Testing on PoCL ..."
 export CLRATIO_DEVICE=${CLRATIO_DEVICE:-cpu}
-mkdir -p "$build/pocl_cache"
+use_pocl "$build"
 rm -f "$build/tests.xml"
 ctest --test-dir "$build" --label-exclude '^slow$' --output-on-failure --output-junit tests.xml --parallel "$(nproc)" \
     --progress </dev/null || true

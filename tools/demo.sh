@@ -3,7 +3,7 @@
 # Writes out/demo/SCENE/{before,after,reference}.exr and out/demo/SCENE.png.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-. tools/packages.sh
+. tools/setup.sh
 
 out=out/demo
 clratio=build/clratio
@@ -59,8 +59,7 @@ scene() {
 
 install_missing "${build_packages[@]}"
 build
-export POCL_CACHE_DIR=$PWD/build/pocl_cache XDG_CACHE_HOME=$PWD/build/cache
-mkdir -p "$POCL_CACHE_DIR"
+use_pocl build
 "$clratio" devices >build/devices.log
 printf '\nTwo scenes rendered by Blender Cycles, 200x150 pixels, on:\n  %s\n' "$(sed -n 's/^\* [0-9]*:[0-9]* *//p' build/devices.log | head -n 1)"
 printf 'Root mean square error against 2048 samples a pixel, after 1 to 8 noisy batches:\n'

@@ -63,3 +63,15 @@ configure() {
     mkdir -p "$folder"
     quietly "$folder/configure.log" cmake -S . -B "$folder" "${options[@]}"
 }
+
+# use_pocl FOLDER: PoCL's kernel cache and ours in FOLDER. Where /sys is not mounted (a bare chroot), PoCL's hwloc sees neither
+# processors nor memory, and PoCL aborts: it is told.
+use_pocl() {
+    export POCL_CACHE_DIR=$PWD/$1/pocl_cache XDG_CACHE_HOME=$PWD/$1/cache
+    mkdir -p "$POCL_CACHE_DIR"
+    [[ -d /sys/devices/system/cpu || ! -r /proc/meminfo ]] && return
+    local kilobytes processors
+    kilobytes=$(sed -n 's/^MemTotal: *\([0-9]*\) kB/\1/p' /proc/meminfo)
+    processors=$(nproc)
+    export HWLOC_SYNTHETIC="numa:1(memory=$((kilobytes * 1024))) pu:$processors"
+}
