@@ -1,11 +1,16 @@
-// The device headers in a user's own C++: the same bits as the library's kernels, and as known answers.
-// A compiler that contracts a*b+c (g++ does, wherever it may use an fma) needs -ffp-contract=off for this file.
+// The device headers in a user's own C++ and in a user's own kernel: the same bits as the library's kernels, and as known
+// answers. With PLANTED_FAULT, logarithms are the C++ library's: right, but of other bits.
+#define CL_HPP_TARGET_OPENCL_VERSION 120
+#define CL_HPP_MINIMUM_OPENCL_VERSION 120
+#include <CL/opencl.hpp>
+
 #include <clratio/clratio.hpp>
 #include <clratio/device/exponential.h>
 #include <clratio/device/ratio.h>
 
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstdio>
 #include <vector>
 
@@ -74,6 +79,39 @@ std::size_t moments_differ() {
     return count;
 }
 
+// A kernel of the user's own on the same headers.
+std::vector<float> logs_on_device(const std::vector<float>& x) {
+    const clratio::Engine engine;
+    const cl::Context context(engine.context(), true);
+    const cl::CommandQueue queue(engine.queue(), true);
+    const cl::Program program(context, clratio::device_source() + R"(
+        kernel void logs(global float* x) { x[get_global_id(0)] = clr_log(x[get_global_id(0)]); })");
+    program.build("-DCLR_WIDTH=1 -DCLR_GROUPED=0 -DCLR_FP64=0");
+    cl::Kernel kernel(program, "logs");
+    std::vector<float> y = x;
+    const cl::Buffer buffer(queue, y.begin(), y.end(), false);
+    kernel.setArg(0, buffer);
+    queue.enqueueNDRangeKernel(kernel, cl::NullRange, cl::NDRange(y.size()));
+    cl::copy(queue, buffer, y.begin(), y.end());
+    return y;
+}
+
+float log_on_host(float x) {
+#if defined(PLANTED_FAULT)
+    return std::log(x);
+#else
+    return clr_log(x);
+#endif
+}
+
+std::size_t logs_differ() {
+    const auto x = uniform(99), y = logs_on_device(x);
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < values; ++i)
+        count += std::bit_cast<std::uint32_t>(y[i]) != std::bit_cast<std::uint32_t>(log_on_host(x[i]));
+    return count;
+}
+
 // 1/3 as a pair, what 0.1f * 0.1f leaves beyond a float, e and ln 10.
 std::size_t known_answers_differ() {
     const clr_two third = clr_two_divide({1, 0}, {3, 0});
@@ -91,7 +129,8 @@ std::size_t known_answers_differ() {
 }  // namespace
 
 int main() {
-    const std::size_t count = moments_differ() + known_answers_differ();
-    std::printf("%zu of %zu values differ\n", count, 6 * values + 5);
-    return count != 0;
+    const std::size_t moments = moments_differ(), logs = logs_differ(), known = known_answers_differ();
+    std::printf("%zu of %zu moments and estimates differ\n%zu of %zu logarithms differ\n", moments, 6 * values, logs,
+                values);
+    return moments + logs + known != 0;
 }
