@@ -81,7 +81,8 @@ TEST(Law, owens_t_is_the_vectors) {
         const double h = v["h"], a = v["a"], want = v["T"];
         const double got = std::copysign(device::clr_owens_t_twice(h, h * std::abs(a), std::abs(a), 1.0) / 2, a);
         EXPECT_LE(std::abs(got - want), 1e-16) << v;
-        if (want > 1e-40) EXPECT_LE(relative(got, want), 1e-12) << v;  // the file's own quadrature ends there
+        if (want < 1e-40) continue;  // the file's own quadrature ends there
+        EXPECT_LE(relative(got, want), 1e-12) << v;
     }
     const auto t = [](double h, double a) { return device::clr_owens_t_twice(h, h * a, a, 1.0) / 2; };
     EXPECT_LE(relative(t(15, .1), 1.5933474067772863391e-51), 1e-12);  // 90 digits
