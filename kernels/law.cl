@@ -53,16 +53,16 @@ static inline clr_real clr_load_points(global const float* x, clr_law_task task,
     return clr_load(lane);
 }
 
-#define CLR_LAW_KERNEL(word, formula)                                                                                   \
-    kernel void word(global const clr_law* models, global const float* x, global float* out, clr_law_task task,         \
-                     clr_range range) {                                                                                 \
-        const clr_span span = clr_my_span(range);                                                                       \
-        for (ulong v = span.begin; v < span.end; v += span.step) {                                                      \
-            const ulong first = v * CLR_WIDTH;                                                                          \
-            const clr_law_lanes m = clr_load_models(models, first, range.count, task.points);                           \
-            const clr_real y = formula(m, clr_load_points(x, task, first, range.count));                                \
-            clr_store_view(y, out, task.out, first, range.count);                                                       \
-        }                                                                                                               \
+#define CLR_LAW_KERNEL(word, formula)                                                                                       \
+    kernel void word(global const clr_law* models, global const float* x, global float* out, clr_law_task task,             \
+                     clr_range range) {                                                                                     \
+        const clr_span span = clr_my_span(range);                                                                           \
+        for (ulong v = span.begin; v < span.end; v += span.step) {                                                          \
+            const ulong first = v * CLR_WIDTH;                                                                              \
+            const clr_law_lanes m = clr_load_models(models, first, range.count, task.points);                               \
+            const clr_real y = formula(m, clr_load_points(x, task, first, range.count));                                    \
+            clr_store_view(y, out, task.out, first, range.count);                                                           \
+        }                                                                                                                   \
     }
 
 CLR_LAW_KERNEL(clr_each_law_pdf, clr_law_pdf)
