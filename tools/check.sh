@@ -6,11 +6,10 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 build="build-check"
 
-# format: tells whether all tracked sources are formatted as .clang-format says.
-format() {
-    local files
-    mapfile -t files < <(git ls-files '*.cpp' '*.hpp' '*.h' '*.cl')
-    clang-format-14 --dry-run -Werror "${files[@]}"
+# The tracked sources that are not formatted as .clang-format says.
+unformatted() {
+    git ls-files -z '*.cpp' '*.hpp' '*.h' '*.cl' |
+        { xargs -0 clang-format-14 --dry-run -Werror 2>&1 || true; } | sed -n 's/:[0-9]*:[0-9]*: error: .*//p' | sort -u
 }
 
 # count ATTRIBUTE: of the <testsuite> in ctest's report.
@@ -20,10 +19,11 @@ install_missing "${build_packages[@]}" "${test_packages[@]}" "${bench_packages[@
 
 failed=0
 echo "Formatting ..."
-format || {
-    echo "These files are not formatted: clang-format-14 -i FILE"
+files=$(unformatted)
+if [[ -n $files ]]; then
+    printf 'Not formatted; clang-format-14 -i does it:\n%s\n' "$files"
     failed=1
-}
+fi
 
 echo "Building in $build with warnings as errors ..."
 configure "$build" -DCLRATIO_WERROR=ON -DCLRATIO_IO=ON -DCLRATIO_TOOL=ON -DCLRATIO_TESTS=ON -DCLRATIO_BENCH=ON \
