@@ -14,6 +14,8 @@ install(EXPORT clratioTargets NAMESPACE clratio:: DESTINATION ${package})
 configure_package_config_file(cmake/clratioConfig.cmake.in ${PROJECT_BINARY_DIR}/clratioConfig.cmake INSTALL_DESTINATION ${package})
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/clratioConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/clratioConfig.cmake ${PROJECT_BINARY_DIR}/clratioConfigVersion.cmake DESTINATION ${package})
+# From the .pc files back to the prefix, wherever that is: cmake --install may be told another one.
+file(RELATIVE_PATH CLRATIO_PC_TO_PREFIX /prefix/${CMAKE_INSTALL_LIBDIR}/pkgconfig /prefix)
 configure_file(cmake/clratio.pc.in ${PROJECT_BINARY_DIR}/clratio.pc @ONLY)
 install(FILES ${PROJECT_BINARY_DIR}/clratio.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 if(TARGET clratio_io)

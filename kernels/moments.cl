@@ -22,8 +22,8 @@ typedef struct {
     global const float *m[CLR_BATCHES_PER_LAUNCH], *t[CLR_BATCHES_PER_LAUNCH];
 } clr_inputs;
 
-// A block of vectors stays in the first cache while the batches go over it one by one: neighbours do not wait for each other, and
-// few streams run through memory at a time. GPUs keep one vector in registers.
+// A block of vectors stays in the first cache while the batches go over it one by one: neighbours do not wait for each
+// other, and few streams run through memory at a time. GPUs keep one vector in registers.
 #if CLR_GROUPED
 #define CLR_BLOCK 1
 #else
@@ -40,10 +40,11 @@ static inline clr_real clr_lost_before(clr_planes planes, clr_state s, ulong i) 
     return clr_load_batches(planes, s, i) == (clr_uint)(s.batches) ? (clr_real)(0.0f) : (clr_real)(1.0f);
 }
 
-// Batch k over a block of whole vectors of contiguous values. The first pass takes the state from the planes, the last one puts
-// it back, save for vectors in doubt: those it returns, a bit each, untouched.
-static inline uint clr_pass(const bool is_first, const bool is_last, uint k, const clr_inputs* in, const clr_batches* batches,
-                            clr_block* block, clr_planes planes, clr_state s, ulong first, clr_uint* negative) {
+// Batch k over a block of whole vectors of contiguous values. The first pass takes the state from the planes, the last one
+// puts it back, save for vectors in doubt: those it returns, a bit each, untouched.
+static inline uint clr_pass(const bool is_first, const bool is_last, uint k, const clr_inputs* in,
+                            const clr_batches* batches, clr_block* block, clr_planes planes, clr_state s, ulong first,
+                            clr_uint* negative) {
     const clr_real zero = (clr_real)(0.0f);
     const clr_batch batch = batches->of[k];
     global const float* m_from = in->m[k] + batch.m.offset + first;
@@ -75,8 +76,8 @@ static inline uint clr_pass(const bool is_first, const bool is_last, uint k, con
     return doubtful;
 }
 
-static inline uint clr_add_block(const clr_inputs* in, const clr_batches* batches, clr_planes planes, clr_state s, ulong first,
-                                 clr_uint* negative) {
+static inline uint clr_add_block(const clr_inputs* in, const clr_batches* batches, clr_planes planes, clr_state s,
+                                 ulong first, clr_uint* negative) {
     clr_block block;
     const uint last = batches->count - 1;
     if (last == 0) return clr_pass(true, true, 0, in, batches, &block, planes, s, first, negative);
@@ -86,8 +87,8 @@ static inline uint clr_add_block(const clr_inputs* in, const clr_batches* batche
 }
 
 // Any vector: each value has a share of its own in each batch.
-static inline void clr_add_vector(const clr_inputs* in, const clr_batches* batches, clr_planes planes, clr_state s, ulong first,
-                                  ulong count, clr_uint* negative, clr_uint* skipped) {
+static inline void clr_add_vector(const clr_inputs* in, const clr_batches* batches, clr_planes planes, clr_state s,
+                                  ulong first, ulong count, clr_uint* negative, clr_uint* skipped) {
     const clr_real zero = (clr_real)(0.0f);
     const bool skips = s.options & CLR_STATE_PER_VALUE;
     clr_record r = clr_load_record(planes, s, first);
@@ -96,7 +97,8 @@ static inline void clr_add_vector(const clr_inputs* in, const clr_batches* batch
         const clr_real m = clr_load_view(in->m[k], batch.m, first, count);
         const clr_real t = clr_load_view(in->t[k], batch.t, first, count);
         const clr_mask bad = skips ? !(clr_is_finite(m) && clr_is_finite(t)) : zero != zero;
-        const clr_two added = clr_two_make(bad ? zero : (clr_real)(batch.weight_hi), bad ? zero : (clr_real)(batch.weight_lo));
+        const clr_two added =
+            clr_two_make(bad ? zero : (clr_real)(batch.weight_hi), bad ? zero : (clr_real)(batch.weight_lo));
         const clr_two sum = clr_two_add(r.weight, added);
         const clr_entry e = clr_entry_make(r.weight, added, sum);
         r.moments = clr_moments_add(r.moments, bad ? zero : m, bad ? zero : t, e);
@@ -129,7 +131,8 @@ kernel void clr_add(CLR_EACH_BATCH(CLR_BATCH_ARGUMENTS) clr_batches batches, CLR
         clr_uint counted = (clr_uint)(0u);
         uint left = whole ? clr_add_block(&in, &batches, planes, s_state, first, &negative) : 1u;
         for (ulong at = first; left; left >>= 1, at += CLR_WIDTH)
-            if (left & 1u) clr_add_vector(&in, &batches, planes, s_state, at, range.count, whole ? &counted : &negative, &skipped);
+            if (left & 1u)
+                clr_add_vector(&in, &batches, planes, s_state, at, range.count, whole ? &counted : &negative, &skipped);
         if (reading.outputs)
             for (ulong k = 0; k < done; ++k) {
                 const ulong at = first + k * CLR_WIDTH;
@@ -178,8 +181,8 @@ kernel void clr_merge(CLR_PLANE_ARGUMENTS(a), CLR_PLANE_ARGUMENTS(b), clr_batch 
 }
 
 // rows[work-item] = how many values of m or t are NaN or infinite.
-kernel void clr_scan(global const float* m, clr_layout m_layout, global const float* t, clr_layout t_layout, global ulong* rows,
-                     clr_range range) {
+kernel void clr_scan(global const float* m, clr_layout m_layout, global const float* t, clr_layout t_layout,
+                     global ulong* rows, clr_range range) {
     clr_uint bad = (clr_uint)(0u);
     const clr_span span = clr_my_span(range);
     for (ulong v = span.begin; v < span.end; v += span.step) {

@@ -59,9 +59,9 @@ void finish(cl_event event) {
 bool fits(benchmark::State& state, const Engine& engine, std::uint64_t bytes, std::uint64_t largest) {
     const auto& d = engine.info();
     if (bytes <= d.global_memory && largest <= d.largest_allocation) return true;
-    state.SkipWithError(("does not fit: " + std::to_string(bytes >> 20) + " MiB on a device of " +
-                         std::to_string(d.global_memory >> 20))
-                            .c_str());
+    state.SkipWithError(
+        ("does not fit: " + std::to_string(bytes >> 20) + " MiB on a device of " + std::to_string(d.global_memory >> 20))
+            .c_str());
     return false;
 }
 

@@ -7,7 +7,9 @@
 #include <string>
 #include <vector>
 
+#ifndef CL_TARGET_OPENCL_VERSION
 #define CL_TARGET_OPENCL_VERSION 300
+#endif
 #include <CL/cl.h>
 
 #include "clratio/exception.hpp"

@@ -5,7 +5,9 @@
 #include <cstddef>
 #include <cstdint>
 
+#ifndef CL_TARGET_OPENCL_VERSION
 #define CL_TARGET_OPENCL_VERSION 300
+#endif
 #include <CL/cl.h>
 
 namespace clratio {
