@@ -6,7 +6,7 @@ using namespace clratio::bench;
 
 namespace {
 
-constexpr MomentsOptions uniform{.nonfinite = NonFinite::propagate};
+constexpr MomentsOptions propagating{.nonfinite = NonFinite::propagate};
 constexpr MomentsOptions skipping{.nonfinite = NonFinite::skip};
 
 std::uint64_t values_of(const benchmark::State& state) { return static_cast<std::uint64_t>(state.range(0)); }
@@ -60,7 +60,7 @@ void read_out(benchmark::State& state, MomentsOptions options) {
     report(state, n, Moments::state_bytes(n, options) + 12 * n);
 }
 
-void limit(benchmark::State& state) { scaling_limit(state, add_bytes(values_of(state), 1, uniform)); }
+void limit(benchmark::State& state) { scaling_limit(state, add_bytes(values_of(state), 1, propagating)); }
 
 void sizes(benchmark::internal::Benchmark* b) {
     b->RangeMultiplier(10)->Range(1000, 100000000)->MeasureProcessCPUTime()->UseRealTime()->Unit(benchmark::kMillisecond);
@@ -69,11 +69,11 @@ void sizes(benchmark::internal::Benchmark* b) {
 }  // namespace
 
 BENCHMARK(limit)->Apply(sizes);
-BENCHMARK_CAPTURE(add, 1, 1, uniform, false)->Apply(sizes);
-BENCHMARK_CAPTURE(add, 8, 8, uniform, false)->Apply(sizes);
+BENCHMARK_CAPTURE(add, 1, 1, propagating, false)->Apply(sizes);
+BENCHMARK_CAPTURE(add, 8, 8, propagating, false)->Apply(sizes);
 BENCHMARK_CAPTURE(add, 1_skip, 1, skipping, false)->Apply(sizes);
 BENCHMARK_CAPTURE(add, 8_skip, 8, skipping, false)->Apply(sizes);
-BENCHMARK_CAPTURE(add, 1_and_read_out, 1, uniform, true)->Apply(sizes);
-BENCHMARK_CAPTURE(merge, uniform, uniform)->Apply(sizes);
-BENCHMARK_CAPTURE(read_out, uniform, uniform)->Apply(sizes);
+BENCHMARK_CAPTURE(add, 1_and_read_out, 1, propagating, true)->Apply(sizes);
+BENCHMARK_CAPTURE(merge, propagate, propagating)->Apply(sizes);
+BENCHMARK_CAPTURE(read_out, propagate, propagating)->Apply(sizes);
 BENCHMARK_CAPTURE(read_out, skip, skipping)->Apply(sizes);

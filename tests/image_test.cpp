@@ -17,7 +17,7 @@
 #include "support/scratch.hpp"
 
 using namespace clratio;
-using support::ExrPart;
+using clratio::test::ExrPart;
 
 namespace {
 
@@ -43,7 +43,7 @@ std::vector<float> channel_of(const Image& image, const std::string& name) {
 std::vector<float> exact_plane(const ExrPart& part, std::size_t c) {
     std::vector<float> plane;
     for (int y = 0; y < part.height(); ++y)
-        for (int x = 0; x < part.width(); ++x) plane.push_back(support::exact_value(c, x, y));
+        for (int x = 0; x < part.width(); ++x) plane.push_back(clratio::test::exact_value(c, x, y));
     return plane;
 }
 
@@ -55,7 +55,7 @@ void expect_as_openexr_reads(const std::string& path, const ExrPart& part) {
               (Window{part.display.min.x, part.display.min.y, part.display.max.x, part.display.max.y}));
     EXPECT_TRUE(image.alpha.empty());
     for (std::size_t c = 0; c < part.channels.size(); ++c) {
-        EXPECT_EQ(channel_of(image, part.channels[c]), support::read_channel(path, 0, part.channels[c]));
+        EXPECT_EQ(channel_of(image, part.channels[c]), clratio::test::read_channel(path, 0, part.channels[c]));
         if (lossless(part.compression, part.type)) {
             EXPECT_EQ(channel_of(image, part.channels[c]), exact_plane(part, c));
         }
@@ -93,49 +93,49 @@ bool same_bits(const std::vector<float>& a, const std::vector<float>& b) {
 }  // namespace
 
 TEST(Image, reads_every_compression_and_pixel_type_as_openexr_does) {
-    const support::Scratch scratch;
+    const clratio::test::Scratch scratch;
     for (const auto compression : compressions)
         for (const auto type : {Imf::HALF, Imf::FLOAT, Imf::UINT})
             for (const int tile : {0, 16}) {
                 SCOPED_TRACE(testing::Message() << "compression " << compression << " type " << type << " tile " << tile);
                 const ExrPart part{.type = type, .compression = compression, .tile = tile};
-                support::write_exr(scratch / "a.exr", {part});
+                clratio::test::write_exr(scratch / "a.exr", {part});
                 expect_as_openexr_reads(scratch / "a.exr", part);
             }
 }
 
 TEST(Image, the_comparison_sees_a_lossy_compression) {
-    const support::Scratch scratch;
+    const clratio::test::Scratch scratch;
     const ExrPart part{.type = Imf::FLOAT, .compression = Imf::DWAA_COMPRESSION};
-    support::write_exr(scratch / "a.exr", {part});
+    clratio::test::write_exr(scratch / "a.exr", {part});
     EXPECT_NE(channel_of(read_image(scratch / "a.exr"), "R"), exact_plane(part, 2));
 }
 
 TEST(Image, reads_level_0_of_mipmaps_and_ripmaps) {
-    const support::Scratch scratch;
+    const clratio::test::Scratch scratch;
     for (const auto levels : {Imf::MIPMAP_LEVELS, Imf::RIPMAP_LEVELS}) {
         const ExrPart part{.type = Imf::HALF, .tile = 8, .levels = levels};
-        support::write_exr(scratch / "a.exr", {part});
+        clratio::test::write_exr(scratch / "a.exr", {part});
         expect_as_openexr_reads(scratch / "a.exr", part);
     }
 }
 
 TEST(Image, reads_a_data_window_that_is_not_the_display_window) {
-    const support::Scratch scratch;
+    const clratio::test::Scratch scratch;
     for (const int tile : {0, 8}) {
         const ExrPart part{.data = {{-7, 11}, {20, 40}}, .display = {{0, 0}, {99, 49}}, .tile = tile};
-        support::write_exr(scratch / "a.exr", {part});
+        clratio::test::write_exr(scratch / "a.exr", {part});
         expect_as_openexr_reads(scratch / "a.exr", part);
     }
 }
 
 TEST(Image, finds_parts_by_name) {
-    const support::Scratch scratch;
+    const clratio::test::Scratch scratch;
     const ExrPart beauty{.type = Imf::HALF, .name = "beauty"};
     const ExrPart depth{.channels = {"Z"}, .name = "depth"};
     const ExrPart tiled{
         .channels = {"light.B", "light.G", "light.R"}, .data = {{5, 5}, {30, 20}}, .tile = 16, .name = "more"};
-    support::write_exr(scratch / "a.exr", {beauty, depth, tiled});
+    clratio::test::write_exr(scratch / "a.exr", {beauty, depth, tiled});
     EXPECT_EQ(channel_of(read_image(scratch / "a.exr"), "G"), exact_plane(beauty, 1)) << "the unnamed colour";
     EXPECT_EQ(channel_of(read_image(scratch / "a.exr:beauty"), "R"), exact_plane(beauty, 2));
     EXPECT_EQ(channel_of(read_image(scratch / "a.exr", "depth"), "Z"), exact_plane(depth, 0));
@@ -143,16 +143,16 @@ TEST(Image, finds_parts_by_name) {
     EXPECT_EQ(channel_of(read_image(scratch / "a.exr:more.light"), "B"), exact_plane(tiled, 0));
     EXPECT_EQ(read_image(scratch / "a.exr:light").data_window, (Window{5, 5, 30, 20}));
 
-    support::write_exr(scratch / "b.exr", {beauty, ExrPart{.name = "second"}});
+    clratio::test::write_exr(scratch / "b.exr", {beauty, ExrPart{.name = "second"}});
     expect_in("beauty, second", refusal(scratch / "b.exr").what());
 }
 
 TEST(Image, finds_layers) {
-    const support::Scratch scratch;
+    const clratio::test::Scratch scratch;
     const std::string path = scratch / "a.exr";
     const ExrPart one{.channels = {"View.Combined.A", "View.Combined.B", "View.Combined.G", "View.Combined.R",
                                    "View.Depth.Z", "View.Normal.X", "View.Normal.Y", "View.Normal.Z"}};
-    support::write_exr(path, {one});
+    clratio::test::write_exr(path, {one});
     const Image image = read_image(path);
     EXPECT_EQ(image.layer, "View.Combined");
     EXPECT_EQ(image.channels, (std::vector<std::string>{"R", "G", "B"}));
@@ -164,22 +164,22 @@ TEST(Image, finds_layers) {
     expect_in("the file has View.Combined, View.Depth (not a colour)", refusal(path, "View").what());
     expect_in(path + ":View", refusal(path, "View").what());
 
-    support::write_exr(path, {{.channels = {"a.B", "a.G", "a.R", "b.B", "b.G", "b.R"}}});
+    clratio::test::write_exr(path, {{.channels = {"a.B", "a.G", "a.R", "b.B", "b.G", "b.R"}}});
     expect_in("several layers and none named (FILE:LAYER, or --layer): a, b", refusal(path).what());
-    support::write_exr(path, {{.channels = {"B", "G", "R", "b.B", "b.G", "b.R"}}});
+    clratio::test::write_exr(path, {{.channels = {"B", "G", "R", "b.B", "b.G", "b.R"}}});
     EXPECT_EQ(read_image(path).layer, "");
-    support::write_exr(path, {{.channels = {"A", "Y"}}});
+    clratio::test::write_exr(path, {{.channels = {"A", "Y"}}});
     EXPECT_EQ(read_image(path).channels, std::vector<std::string>{"Y"});
     EXPECT_EQ(read_image(path).alpha.size(), 37u * 23u);
-    support::write_exr(path, {{.channels = {"A"}}});
+    clratio::test::write_exr(path, {{.channels = {"A"}}});
     EXPECT_EQ(read_image(path).channels, std::vector<std::string>{"A"});
-    support::write_exr(path, {{.channels = {"u.U", "v.V"}}});
+    clratio::test::write_exr(path, {{.channels = {"u.U", "v.V"}}});
     expect_in("several layers", refusal(path).what());
 }
 
 TEST(Image, reads_a_file_with_a_colon_in_its_name) {
-    const support::Scratch scratch;
-    support::write_exr(scratch / "take:2.exr", {ExrPart{}});
+    const clratio::test::Scratch scratch;
+    clratio::test::write_exr(scratch / "take:2.exr", {ExrPart{}});
     EXPECT_EQ(read_image(scratch / "take:2.exr").path, scratch / "take:2.exr");
 }
 
@@ -190,47 +190,48 @@ TEST(Image, reads_what_blender_writes) {
     EXPECT_EQ(image.width(), 161);
     EXPECT_EQ(image.height(), 107);
     EXPECT_EQ(image.alpha.size(), 161u * 107u);
-    EXPECT_EQ(channel_of(image, "G"), support::read_channel(folder + "m_000.exr", 0, "ViewLayer.Combined.G"));
+    EXPECT_EQ(channel_of(image, "G"), clratio::test::read_channel(folder + "m_000.exr", 0, "ViewLayer.Combined.G"));
 }
 
 TEST(Image, refuses_what_it_cannot_read_by_name) {
-    const support::Scratch scratch;
+    const clratio::test::Scratch scratch;
     expect_in(scratch / "none.exr" + ": no such file", refusal(scratch / "none.exr").what());
     expect_in("is a folder", refusal(scratch / "").what());
-    support::put_bytes(scratch / "text.exr", "not an image");
+    clratio::test::put_bytes(scratch / "text.exr", "not an image");
     expect_in("text.exr: cannot be opened, or is not an OpenEXR file", refusal(scratch / "text.exr").what());
-    support::put_bytes(scratch / "empty.exr", "");
+    clratio::test::put_bytes(scratch / "empty.exr", "");
     expect_in("empty.exr", refusal(scratch / "empty.exr").what());
-    support::write_deep_exr(scratch / "deep.exr");
+    clratio::test::write_deep_exr(scratch / "deep.exr");
     expect_in("deep.exr: deep images", refusal(scratch / "deep.exr").what());
-    support::write_exr(scratch / "sub.exr", {{.data = {{0, 0}, {31, 31}}, .display = {{0, 0}, {31, 31}}, .sampling = 2}});
+    clratio::test::write_exr(scratch / "sub.exr",
+                             {{.data = {{0, 0}, {31, 31}}, .display = {{0, 0}, {31, 31}}, .sampling = 2}});
     expect_in("sub.exr: channel B is subsampled", refusal(scratch / "sub.exr").what());
 }
 
 TEST(Image, refuses_a_file_whose_writer_stopped) {
-    const support::Scratch scratch;
+    const clratio::test::Scratch scratch;
     const ExrPart part{.compression = Imf::NO_COMPRESSION};
     {
-        const auto header = support::header_of(part);
+        const auto header = clratio::test::header_of(part);
         Imf::MultiPartOutputFile file((scratch / "a.exr").c_str(), &header, 1);
         std::vector<std::vector<char>> planes;
-        for (std::size_t c = 0; c < 3; ++c) planes.push_back(support::plane_of(part, c));
+        for (std::size_t c = 0; c < 3; ++c) planes.push_back(clratio::test::plane_of(part, c));
         Imf::OutputPart out(file, 0);
-        out.setFrameBuffer(support::frame_of(part, planes));
+        out.setFrameBuffer(clratio::test::frame_of(part, planes));
         out.writePixels(part.height() - 1);
     }
     expect_in("incomplete: pixels are missing", refusal(scratch / "a.exr").what());
 }
 
 TEST(Image, refuses_every_truncated_file) {
-    const support::Scratch scratch;
+    const clratio::test::Scratch scratch;
     for (const auto compression : compressions)
         for (const int tile : {0, 16}) {
-            support::write_exr(scratch / "a.exr", {{.type = Imf::HALF, .compression = compression, .tile = tile}});
-            const std::string whole = support::bytes_of(scratch / "a.exr");
+            clratio::test::write_exr(scratch / "a.exr", {{.type = Imf::HALF, .compression = compression, .tile = tile}});
+            const std::string whole = clratio::test::bytes_of(scratch / "a.exr");
             const std::size_t step = compression == Imf::ZIP_COMPRESSION ? 1 : 61;
             for (std::size_t size = 0; size < whole.size(); size += step) {
-                support::put_bytes(scratch / "cut.exr", whole.substr(0, size));
+                clratio::test::put_bytes(scratch / "cut.exr", whole.substr(0, size));
                 EXPECT_THROW(read_image(scratch / "cut.exr"), IoError)
                     << size << " of " << whole.size() << " bytes, " << compression;
             }
@@ -238,16 +239,16 @@ TEST(Image, refuses_every_truncated_file) {
 }
 
 TEST(Image, a_flipped_byte_of_a_checksummed_file_is_an_error_or_changes_nothing) {
-    const support::Scratch scratch;
+    const clratio::test::Scratch scratch;
     for (const auto compression : {Imf::ZIP_COMPRESSION, Imf::ZIPS_COMPRESSION, Imf::PXR24_COMPRESSION}) {
-        support::write_exr(scratch / "a.exr", {{.type = Imf::HALF, .compression = compression}});
-        const std::string whole = support::bytes_of(scratch / "a.exr");
+        clratio::test::write_exr(scratch / "a.exr", {{.type = Imf::HALF, .compression = compression}});
+        const std::string whole = clratio::test::bytes_of(scratch / "a.exr");
         const Image right = read_image(scratch / "a.exr");
         int refused = 0;
-        for (std::size_t at = support::header_end(whole); at < whole.size(); ++at) {
+        for (std::size_t at = clratio::test::header_end(whole); at < whole.size(); ++at) {
             std::string damaged = whole;
             damaged[at] = static_cast<char>(damaged[at] ^ (1 << at % 8));
-            support::put_bytes(scratch / "b.exr", damaged);
+            clratio::test::put_bytes(scratch / "b.exr", damaged);
             try {
                 EXPECT_TRUE(same_bits(read_image(scratch / "b.exr").values, right.values))
                     << "byte " << at << ", " << compression;
@@ -260,16 +261,16 @@ TEST(Image, a_flipped_byte_of_a_checksummed_file_is_an_error_or_changes_nothing)
 }
 
 TEST(Image, a_flipped_byte_anywhere_never_crashes) {
-    const support::Scratch scratch;
+    const clratio::test::Scratch scratch;
     for (const auto compression : compressions)
         for (const int tile : {0, 16}) {
-            support::write_exr(scratch / "a.exr", {{.type = Imf::HALF, .compression = compression, .tile = tile}});
-            const std::string whole = support::bytes_of(scratch / "a.exr");
-            const std::size_t head = support::header_end(whole);
+            clratio::test::write_exr(scratch / "a.exr", {{.type = Imf::HALF, .compression = compression, .tile = tile}});
+            const std::string whole = clratio::test::bytes_of(scratch / "a.exr");
+            const std::size_t head = clratio::test::header_end(whole);
             for (std::size_t at = 0; at < whole.size(); at += at < head ? 1 : 13) {
                 std::string damaged = whole;
                 damaged[at] = static_cast<char>(~damaged[at]);
-                support::put_bytes(scratch / "b.exr", damaged);
+                clratio::test::put_bytes(scratch / "b.exr", damaged);
                 try {
                     const Image image = read_image(scratch / "b.exr");
                     EXPECT_EQ(image.size(), static_cast<std::size_t>(image.width()) *
@@ -281,17 +282,17 @@ TEST(Image, a_flipped_byte_anywhere_never_crashes) {
 }
 
 TEST(Image, refuses_a_header_that_asks_for_more_than_the_file_holds) {
-    const support::Scratch scratch;
-    support::write_exr(scratch / "a.exr", {ExrPart{}});
-    std::string damaged = support::bytes_of(scratch / "a.exr");
+    const clratio::test::Scratch scratch;
+    clratio::test::write_exr(scratch / "a.exr", {ExrPart{}});
+    std::string damaged = clratio::test::bytes_of(scratch / "a.exr");
     const int wide = 1 << 24;
     std::memcpy(&damaged[damaged.find("dataWindow") + sizeof "dataWindow" + sizeof "box2i" + 4 + 8], &wide, 4);
-    support::put_bytes(scratch / "b.exr", damaged);
+    clratio::test::put_bytes(scratch / "b.exr", damaged);
     expect_in("asks for more pixels than the file can hold", refusal(scratch / "b.exr").what());
 }
 
 TEST(Image, a_written_file_has_the_same_bits) {
-    const support::Scratch scratch;
+    const clratio::test::Scratch scratch;
     Image image = small_image();
     image.values[0] = std::numeric_limits<float>::infinity();
     image.values[1] = std::bit_cast<float>(0x7fc12345u);
@@ -309,7 +310,7 @@ TEST(Image, a_written_file_has_the_same_bits) {
 }
 
 TEST(Image, metadata_is_carried_and_settings_are_added) {
-    const support::Scratch scratch;
+    const clratio::test::Scratch scratch;
     Image image = read_image(CLRATIO_TEST_DATA "/cycles/multilayer/m_000.exr");
     write_image(scratch / "a.exr", image, {{{"clratio/estimator", "ratio"}}});
     Imf::MultiPartInputFile was(CLRATIO_TEST_DATA "/cycles/multilayer/m_000.exr"), is((scratch / "a.exr").c_str());
@@ -331,7 +332,7 @@ TEST(Image, metadata_is_carried_and_settings_are_added) {
 }
 
 TEST(Image, flags_are_uint_channels) {
-    const support::Scratch scratch;
+    const clratio::test::Scratch scratch;
     const Image like = small_image();
     std::vector<std::uint32_t> flags(like.size());
     for (std::size_t i = 0; i < flags.size(); ++i) flags[i] = static_cast<std::uint32_t>(i % 64);
@@ -343,7 +344,7 @@ TEST(Image, flags_are_uint_channels) {
 }
 
 TEST(Image, refuses_to_write_what_does_not_fit_together) {
-    const support::Scratch scratch;
+    const clratio::test::Scratch scratch;
     const auto refused = [&](const char* name, auto change) {
         Image image = small_image();
         change(image);
@@ -365,7 +366,7 @@ TEST(Image, refuses_to_write_what_does_not_fit_together) {
 }
 
 TEST(Image, refuses_targets_that_are_no_files) {
-    const support::Scratch scratch;
+    const clratio::test::Scratch scratch;
     for (const std::string target : {"/dev/null", "/nowhere/a.exr", "/tmp"}) {
         try {
             write_image(target, small_image());
@@ -378,7 +379,7 @@ TEST(Image, refuses_targets_that_are_no_files) {
 }
 
 TEST(Image, a_link_is_followed) {
-    const support::Scratch scratch;
+    const clratio::test::Scratch scratch;
     write_image(scratch / "a.exr", small_image());
     std::filesystem::create_symlink("a.exr", scratch / "link.exr");
     Image other = small_image();
@@ -420,28 +421,28 @@ Ended write_limited(const std::string& path, const Image& image, std::size_t lim
 }  // namespace
 
 TEST(Image, a_full_disk_is_an_error_and_leaves_the_old_file) {
-    const support::Scratch scratch;
+    const clratio::test::Scratch scratch;
     const std::string path = scratch / "a.exr";
     Image image = small_image();
     write_image(path, image);
-    const std::string old = support::bytes_of(path);
+    const std::string old = clratio::test::bytes_of(path);
     image.values[5] = 3;
     write_image(scratch / "b.exr", image);
-    const std::size_t size = support::bytes_of(scratch / "b.exr").size();
+    const std::size_t size = clratio::test::bytes_of(scratch / "b.exr").size();
 
     for (std::size_t limit = 0; limit < size; limit = limit + 40 < size ? limit + 40 : limit + 1) {
         EXPECT_EQ(write_limited(path, image, limit), refused) << limit << " of " << size << " bytes";
-        EXPECT_EQ(support::bytes_of(path), old);
+        EXPECT_EQ(clratio::test::bytes_of(path), old);
         EXPECT_EQ(scratch.files(), 2u) << "the temporary file is gone";
     }
     EXPECT_EQ(write_limited(path, image, size), wrote);
-    EXPECT_EQ(support::bytes_of(path), support::bytes_of(scratch / "b.exr"));
+    EXPECT_EQ(clratio::test::bytes_of(path), clratio::test::bytes_of(scratch / "b.exr"));
     EXPECT_EQ(scratch.files(), 2u);
 }
 
 // As OpenEXR's destructor does when it writes the offset table.
 TEST(Image, a_failed_write_that_was_swallowed_is_thrown_at_close) {
-    const support::Scratch scratch;
+    const clratio::test::Scratch scratch;
     const auto write = [&](std::size_t bytes) {
         FileOutput out(scratch / "a.exr");
         try {
@@ -481,7 +482,7 @@ TEST(Image, other_shapes_are_refused_with_both_names) {
 }
 
 TEST(Image, combines_with_an_image_of_tau_and_keeps_its_shape) {
-    const support::Scratch scratch;
+    const clratio::test::Scratch scratch;
     const std::string folder = CLRATIO_TEST_DATA "/cycles/multilayer/";
     Engine engine;
     auto tau = read_image(folder + "t_ref.exr");

@@ -13,9 +13,9 @@
 #include "support/scratch.hpp"
 
 using namespace clratio;
+using clratio::test::Said;
+using clratio::test::Scratch;
 using nlohmann::json;
-using support::Said;
-using support::Scratch;
 
 namespace {
 
@@ -28,8 +28,8 @@ Words operator+(Words a, const Words& b) {
     return a;
 }
 
-Said clratio_tool(const Words& words, const support::Surroundings& around = {}) {
-    return support::run(CLRATIO_TOOL, words, around);
+Said clratio_tool(const Words& words, const clratio::test::Surroundings& around = {}) {
+    return clratio::test::run(CLRATIO_TOOL, words, around);
 }
 
 Words files(const std::string& scene, const char* kind, int count) {
@@ -57,7 +57,7 @@ void expect_in(const std::string& part, const std::string& text) {
 }
 
 /// The named exit code, `part` in one line on stderr, nothing on stdout.
-void expect_refused(const Words& words, int code, const std::string& part, const support::Surroundings& around = {}) {
+void expect_refused(const Words& words, int code, const std::string& part, const clratio::test::Surroundings& around = {}) {
     const Said said = clratio_tool(words, around);
     EXPECT_EQ(said.code, code) << said.err;
     EXPECT_EQ(said.out, "");
@@ -168,7 +168,7 @@ TEST(Tool, the_multilayer_pair_combines_without_conversion) {
 TEST(Tool, layers_are_named_for_one_file_or_for_all) {
     const Scratch scratch;
     const Words layers{"a.B", "a.G", "a.R", "b.B", "b.G", "b.R"};
-    support::write_exr(scratch / "x.exr", {{.channels = layers}});
+    clratio::test::write_exr(scratch / "x.exr", {{.channels = layers}});
     const std::string x = scratch / "x.exr", out = scratch / "o.exr";
     expect_refused({"combine", "--m", x, "--t", x, "--tau", "1", "-o", out}, 1, x + ": several layers and none named");
     combined({"combine", "--m", x, "--t", x + ":b", "--tau", x, "-o", out, "--layer", "a"});
@@ -304,7 +304,7 @@ TEST(Tool, errors_exit_1_and_name_the_file) {
     const std::string out = scratch / "o.exr", none = scratch / "none.exr", text = scratch / "text.exr",
                       small = scratch / "small.exr";
     const std::string m = files("area", "m", 1)[0], t = files("area", "t", 1)[0];
-    support::put_bytes(text, "text");
+    clratio::test::put_bytes(text, "text");
     write_image(small, made(5, 4, 1));
     const auto refused = [&](const std::string& m_file, const std::string& t_file, const std::string& tau,
                              const std::string& part) {
@@ -318,7 +318,7 @@ TEST(Tool, errors_exit_1_and_name_the_file) {
     refused(m, small, "1", small);
     refused(m, small, "1", m);
     refused(m, t, small, small);
-    support::put_bytes(scratch / "cut.exr", support::bytes_of(m).substr(0, 90000));
+    clratio::test::put_bytes(scratch / "cut.exr", clratio::test::bytes_of(m).substr(0, 90000));
     refused(scratch / "cut.exr", t, "1", scratch / "cut.exr");
     const Words good{"combine", "--m", m, "--t", t, "--tau", "1"};
     expect_refused(good + Words{"-o", scratch / "no/o.exr"}, 1, scratch / "no/o.exr");
@@ -336,9 +336,9 @@ TEST(Tool, a_full_disk_exits_1_and_keeps_the_old_file) {
     const std::string out = scratch / "o.exr";
     const Words words = pairs("area", 1) + Words{"--tau", "1", "-o", out};
     combined(words);
-    const std::string old = support::bytes_of(out);
+    const std::string old = clratio::test::bytes_of(out);
     expect_refused(words, 1, out + ": cannot be written: File too large", {.file_size_limit = old.size() - 1});
-    EXPECT_EQ(support::bytes_of(out), old);
+    EXPECT_EQ(clratio::test::bytes_of(out), old);
     EXPECT_EQ(scratch.files(), 1u);
 }
 

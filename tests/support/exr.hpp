@@ -19,7 +19,7 @@
 #include <string>
 #include <vector>
 
-namespace support {
+namespace clratio::test {
 
 struct ExrPart {
     std::vector<std::string> channels{"B", "G", "R"};  // as OpenEXR sorts them
@@ -161,4 +161,4 @@ inline std::size_t header_end(const std::string& file) {
     return at + 1;
 }
 
-}  // namespace support
+}  // namespace clratio::test

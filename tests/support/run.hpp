@@ -15,7 +15,7 @@
 
 #include "support/scratch.hpp"
 
-namespace support {
+namespace clratio::test {
 
 struct Said {
     int code = -1;  ///< exit code, or 128 + signal
@@ -52,4 +52,4 @@ inline Said run(const std::string& program, const std::vector<std::string>& argu
             bytes_of(err)};
 }
 
-}  // namespace support
+}  // namespace clratio::test

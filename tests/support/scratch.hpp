@@ -9,7 +9,7 @@
 #include <iterator>
 #include <string>
 
-namespace support {
+namespace clratio::test {
 
 class Scratch {
 public:
@@ -43,4 +43,4 @@ inline void put_bytes(const std::string& path, const std::string& bytes) {
     std::ofstream(path, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
 }
 
-}  // namespace support
+}  // namespace clratio::test
