@@ -7,5 +7,7 @@
 #include "clratio/exception.hpp"
 #include "clratio/fit.hpp"
 #include "clratio/law.hpp"
+#include "clratio/histogram.hpp"
 #include "clratio/moments.hpp"
+#include "clratio/stream.hpp"
 #include "clratio/view.hpp"
