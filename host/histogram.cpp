@@ -46,19 +46,15 @@ void report(const Progress& progress, std::uint64_t done, std::uint64_t total) {
 class Totals {
 public:
     Totals(const Engine& engine, std::span<std::uint64_t> rows)
-        : buffer_(Buffer::onto_host(engine, std::as_writable_bytes(rows))), rows_(rows) {
+        : buffer_(Buffer::onto_host(engine, std::as_writable_bytes(rows))) {
         if (!engine.info().host_memory) buffer_.write(std::as_bytes(rows));
     }
-    ~Totals() = default;
-    Totals(const Totals&) = delete;
-    Totals& operator=(const Totals&) = delete;
 
     const Buffer& buffer() const { return buffer_; }
     void publish() const { buffer_.publish(); }
 
 private:
     Buffer buffer_;
-    std::span<std::uint64_t> rows_;
 };
 
 // How tasks run on this engine: see kernels/histogram.cl.

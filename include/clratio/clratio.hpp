@@ -6,6 +6,8 @@
 #include "clratio/error.hpp"
 #include "clratio/exception.hpp"
 #include "clratio/fit.hpp"
+#include "clratio/histogram.hpp"
 #include "clratio/law.hpp"
 #include "clratio/moments.hpp"
+#include "clratio/stream.hpp"
 #include "clratio/view.hpp"
