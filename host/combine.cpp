@@ -181,6 +181,21 @@ Combined combine(const Moments& moments, const Tau& tau, CombineOptions options)
     return out.take();
 }
 
+Combined add_and_combine(Moments& moments, std::span<const HostBatch> batches, const Tau& tau, CombineOptions options) {
+    auto& s = moments.state();
+    check_estimator(options, s.options);
+    if (batches.empty()) throw InvalidArgument("batches", "at least 1", "0");
+    const DeviceTau control = put(s.engine, tau, s.values);
+    const OnDevice in = put_on_device(s, batches);
+    HostOutput out(s.engine, s.values, options);
+    const Reading reading = out.reading(control.view, options);
+    const std::size_t fused = std::min<std::size_t>(batches.size(), CLR_BATCHES_PER_LAUNCH);
+    const auto all = std::span<const Batch>(in.batches);
+    add_batches(s, all.first(all.size() - fused), {});
+    wait(add_batches(s, all.last(fused), &reading, {}));
+    return out.take();
+}
+
 cl_event add_and_combine(Moments& moments, std::span<const Batch> batches, View tau, const CombineOutput& out,
                          CombineOptions options, std::span<const cl_event> wait_list) {
     auto& s = moments.state();

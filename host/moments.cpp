@@ -165,27 +165,37 @@ void Moments::add(std::span<const float> m, std::span<const float> t, double wei
     add(std::span(&batch, 1));
 }
 
-void Moments::add(std::span<const HostBatch> batches) {
-    auto& s = *state_;
-    std::vector<Buffer> memory;
-    std::vector<Batch> views;
+OnDevice put_on_device(const Moments::State& s, std::span<const HostBatch> batches) {
+    OnDevice out;
+    const auto put = [&](const char* name, std::span<const float> values) -> View {
+        if (values.size() != s.values)
+            throw InvalidArgument(name, std::to_string(s.values) + " values", std::to_string(values.size()));
+        out.memory.push_back(Buffer::from_host(s.engine, std::as_bytes(values)));
+        return {out.memory.back().mem(), 0, s.values};
+    };
     for (const auto& b : batches) {
         check_weight(b.weight);
-        for (const auto& [name, values] : {std::pair{"m", b.m}, std::pair{"t", b.t}}) {
-            if (values.size() != s.values)
-                throw InvalidArgument(name, std::to_string(s.values) + " values", std::to_string(values.size()));
-            memory.push_back(Buffer::from_host(s.engine, std::as_bytes(values)));
-        }
-        const std::size_t last = memory.size() - 1;
-        views.push_back({{memory[last - 1].mem(), 0, s.values}, {memory[last].mem(), 0, s.values}, b.weight});
+        const View m = put("m", b.m), t = put("t", b.t);
+        out.batches.push_back({m, t, b.weight});
     }
-    if (s.options.nonfinite == NonFinite::fail) refuse_nonfinite(s.engine, views);
-    check_room(s.batches, views.size());
-    for (std::span<const Batch> rest = views; !rest.empty();) {
-        const auto now = rest.first(std::min<std::size_t>(rest.size(), CLR_BATCHES_PER_LAUNCH));
-        wait(add_batches(s, now, nullptr, {}));
-        rest = rest.subspan(now.size());
+    if (s.options.nonfinite == NonFinite::fail) refuse_nonfinite(s.engine, out.batches);
+    check_room(s.batches, batches.size());
+    return out;
+}
+
+Event add_batches(Moments::State& s, std::span<const Batch> batches, std::span<const cl_event> waits) {
+    Event done;
+    while (!batches.empty()) {
+        const auto now = batches.first(std::min<std::size_t>(batches.size(), CLR_BATCHES_PER_LAUNCH));
+        done = add_batches(s, now, nullptr, waits);
+        batches = batches.subspan(now.size());
     }
+    return done;
+}
+
+void Moments::add(std::span<const HostBatch> batches) {
+    const OnDevice put = put_on_device(*state_, batches);
+    wait(add_batches(*state_, put.batches, {}));
 }
 
 cl_event Moments::add(std::span<const Batch> batches, std::span<const cl_event> wait_list) {
@@ -193,13 +203,7 @@ cl_event Moments::add(std::span<const Batch> batches, std::span<const cl_event> 
     if (batches.empty()) throw InvalidArgument("batches", "at least one", "none");
     check_batches(s, batches);
     check_room(s.batches, batches.size());
-    Event done;
-    while (!batches.empty()) {
-        const auto now = batches.first(std::min<std::size_t>(batches.size(), CLR_BATCHES_PER_LAUNCH));
-        done = add_batches(s, now, nullptr, wait_list);
-        batches = batches.subspan(now.size());
-    }
-    return done.give();
+    return add_batches(s, batches, wait_list).give();
 }
 
 cl_event Moments::merge(const Moments& other, std::span<const cl_event> wait_list) {

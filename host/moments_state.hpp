@@ -41,9 +41,18 @@ struct Reading {
 /// Weights, sizes and the nonfinite policy of batches that come as views.
 void check_batches(const Moments::State& state, std::span<const Batch> batches);
 
+/// Host batches as views, with the buffers under them. Checks what Moments::add promises to check.
+struct OnDevice {
+    std::vector<Buffer> memory;
+    std::vector<Batch> batches;
+};
+OnDevice put_on_device(const Moments::State& state, std::span<const HostBatch> batches);
+
 /// Adds 1 to 8 batches in one launch, and reads out in the same pass where asked.
 Event add_batches(Moments::State& state, std::span<const Batch> batches, const Reading* reading,
                   std::span<const cl_event> waits);
+/// Adds any number of batches, 8 in a launch; the event of the last.
+Event add_batches(Moments::State& state, std::span<const Batch> batches, std::span<const cl_event> waits);
 
 /// Names a plane that the estimator needs and the state lacks.
 void check_estimator(const CombineOptions& options, const MomentsOptions& state);

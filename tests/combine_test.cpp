@@ -304,6 +304,26 @@ TEST(Combine, fused_add_and_read_out_equals_the_two_calls) {
     }
 }
 
+TEST(Combine, fused_host_form_equals_the_two_calls_for_any_number_of_batches) {
+    const Engine engine;
+    for (const std::size_t count : {1, 8, 9, 19}) {
+        std::vector<Pair> pairs;
+        for (std::size_t k = 0; k < count; ++k) pairs.push_back(make_pair_of(k + 1));
+        std::vector<HostBatch> batches;
+        for (const auto& p : pairs) batches.push_back({p.m, p.t, 2});
+        Moments a(engine, values), b(engine, values);
+        const Combined fused = add_and_combine(a, batches, 0.5f, {.standard_error = true});
+        b.add(batches);
+        const Combined apart = combine(b, 0.5f, {.standard_error = true});
+        EXPECT_EQ(bits(fused.estimate), bits(apart.estimate));
+        EXPECT_EQ(bits(fused.standard_error), bits(apart.standard_error));
+        EXPECT_EQ(fused.flags.any, apart.flags.any);
+        EXPECT_EQ(a.bits(&StatePlanes::mt), b.bits(&StatePlanes::mt));
+    }
+    Moments none(engine, values);
+    EXPECT_THROW(add_and_combine(none, std::span<const HostBatch>{}, 0.5f), InvalidArgument);
+}
+
 TEST(Combine, event_form_is_right_on_an_out_of_order_queue) {
     const Engine own;
     cl_int code = CL_SUCCESS;

@@ -46,27 +46,26 @@ Bands::Bands(const clratio::Engine& engine, std::uint64_t values, std::uint64_t 
     : engine_(engine), values_(values), band_(std::max(values_in_a_band / channels, std::uint64_t{1}) * channels),
       options_(options) {}
 
-void Bands::add_slices(Moments& to, std::uint64_t band, std::span<const HostBatch> batches) const {
-    std::vector<HostBatch> slices;
+std::vector<HostBatch> Bands::slices(std::uint64_t band, std::span<const HostBatch> batches) const {
+    std::vector<HostBatch> out;
     for (const auto& b : batches)
-        slices.push_back({b.m.subspan(begin(band), size(band)), b.t.subspan(begin(band), size(band)), b.weight});
-    to.add(slices);
+        out.push_back({b.m.subspan(begin(band), size(band)), b.t.subspan(begin(band), size(band)), b.weight});
+    return out;
 }
 
 void Bands::add(std::span<const HostBatch> batches) {
     for (std::uint64_t band = 0; band < bands(); ++band) {
         if (band == states_.size()) states_.push_back(make(band));
-        add_slices(states_[band], band, batches);
+        states_[band].add(slices(band, batches));
     }
 }
 
-template <class State> ReadOut Bands::read(State state, const Tau& tau, const Wanted& wanted) const {
+template <class Read> ReadOut Bands::read(Read read_band, const Tau& tau, const Wanted& wanted) const {
     ReadOut out;
     out.chosen.estimate.reserve(values_);
     for (std::uint64_t band = 0; band < bands(); ++band) {
-        const Moments moments = state(band);
         const Tau part = slice(tau, begin(band), size(band));
-        const Combined read = clratio::combine(moments, part, wanted.options);
+        const auto [moments, read] = read_band(band, part);
         append(out.chosen, read, wanted.flag_image);
         out.flagged += count_flagged(read.flag_image, wanted.counted);
         if (wanted.mean) append(out.mean, clratio::combine(moments, part, plain_mean(wanted.options)), false);
@@ -76,16 +75,19 @@ template <class State> ReadOut Bands::read(State state, const Tau& tau, const Wa
 }
 
 ReadOut Bands::read_out(const Tau& tau, const Wanted& wanted) const {
-    return read([&](std::uint64_t band) { return states_[band]; }, tau, wanted);
+    const auto read_band = [&](std::uint64_t band, const Tau& part) {
+        return std::pair{states_[band], clratio::combine(states_[band], part, wanted.options)};
+    };
+    return read(read_band, tau, wanted);
 }
 
 ReadOut Bands::at_once(std::span<const HostBatch> batches, const Tau& tau, const Wanted& wanted) const {
-    const auto summed = [&](std::uint64_t band) {
+    const auto read_band = [&](std::uint64_t band, const Tau& part) {
         Moments moments = make(band);
-        add_slices(moments, band, batches);
-        return moments;
+        auto combined = clratio::add_and_combine(moments, slices(band, batches), part, wanted.options);
+        return std::pair{std::move(moments), std::move(combined)};
     };
-    return read(summed, tau, wanted);
+    return read(read_band, tau, wanted);
 }
 
 }  // namespace tool

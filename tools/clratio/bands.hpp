@@ -37,8 +37,8 @@ private:
     std::uint64_t begin(std::uint64_t band) const { return band * band_; }
     std::uint64_t size(std::uint64_t band) const { return std::min(band_, values_ - begin(band)); }
     clratio::Moments make(std::uint64_t band) const { return {engine_, size(band), options_}; }
-    void add_slices(clratio::Moments& to, std::uint64_t band, std::span<const clratio::HostBatch> batches) const;
-    template <class State> ReadOut read(State state, const clratio::Tau& tau, const Wanted& wanted) const;
+    std::vector<clratio::HostBatch> slices(std::uint64_t band, std::span<const clratio::HostBatch> batches) const;
+    template <class Read> ReadOut read(Read read_band, const clratio::Tau& tau, const Wanted& wanted) const;
 
     clratio::Engine engine_;
     std::uint64_t values_, band_;  ///< band_: a multiple of the channels, so that each band starts with the first
