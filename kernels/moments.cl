@@ -60,8 +60,7 @@ static inline uint clr_pass(const bool is_first, const bool is_last, uint k, con
         const clr_real before = is_first ? clr_lost_before(planes, s, at) : block->doubt[v];
         const clr_real doubt = clr_fma(m, zero, clr_fma(t, zero, before));
         below += clr_one_where(m < zero) + clr_one_where(t < zero);
-        const clr_moments moments =
-            clr_moments_add(is_first ? clr_load_moments(planes, s, at) : block->moments[v], m, t, e);
+        const clr_moments moments = clr_moments_add(is_first ? clr_load_moments(planes, s, at) : block->moments[v], m, t, e);
         if (!is_last) {
             block->moments[v] = moments;
             block->doubt[v] = doubt;
@@ -173,8 +172,8 @@ kernel void clr_merge(CLR_PLANE_ARGUMENTS(a), CLR_PLANE_ARGUMENTS(b), clr_batch 
         }
         clr_store_moments(clr_moments_merge(moments, other, e), to, a_state.stride, first);
         if (a_state.options & CLR_STATE_RATIOS) {
-            const clr_ratios sum = clr_ratios_merge(clr_load_ratios(to, a_state, first),
-                                                    clr_load_ratios(from, b_state, first), e);
+            const clr_ratios sum =
+                clr_ratios_merge(clr_load_ratios(to, a_state, first), clr_load_ratios(from, b_state, first), e);
             clr_store_ratios(sum, to, a_state.stride, first);
         }
     }

@@ -3,8 +3,7 @@ function(clratio_package_test step)
   add_test(NAME package.${step} COMMAND ${CMAKE_COMMAND} -DSTEP=${step} -DBINARY=${PROJECT_BINARY_DIR}
     -DSOURCE=${PROJECT_SOURCE_DIR} -DGENERATOR=${CMAKE_GENERATOR} -DCOMPILER=${CMAKE_CXX_COMPILER}
     -DLAUNCHER=${CMAKE_CXX_COMPILER_LAUNCHER} -P ${CMAKE_CURRENT_SOURCE_DIR}/package_test.cmake)
-  set_tests_properties(package.${step} PROPERTIES ENVIRONMENT
-    "POCL_CACHE_DIR=${PROJECT_BINARY_DIR}/pocl_cache;XDG_CACHE_HOME=${PROJECT_BINARY_DIR}/cache")
+  set_tests_properties(package.${step} PROPERTIES ENVIRONMENT ${caches})
 endfunction()
 
 clratio_package_test(readme)

@@ -7,7 +7,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 build="build-bench"
 install_missing "${build_packages[@]}" "${bench_packages[@]}"
 echo "Building in $build ..."
-configure "$build" -DCLRATIO_BENCH=ON -DCLRATIO_TESTS=OFF
+configure "$build" -DCLRATIO_BENCH=ON -DCLRATIO_TESTS=OFF -DCLRATIO_TOOL=OFF -DCLRATIO_IO=OFF
 quietly "$build/build.log" cmake --build "$build" --parallel "$(nproc)"
 
 use_pocl "$build"

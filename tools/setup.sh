@@ -13,7 +13,7 @@ build_packages=(
 test_packages=(libgtest-dev clang-format-14 oclgrind git)
 # To build the benchmarks.
 # shellcheck disable=SC2034
-bench_packages=(libbenchmark-dev)
+bench_packages=(libbenchmark-dev librandom123-dev python3-numpy)
 
 installed() { [[ $(dpkg-query --show --showformat='${db:Status-Status}' "$1" 2>/dev/null) == installed ]]; }
 
