@@ -60,7 +60,8 @@ static inline uint clr_pass(const bool is_first, const bool is_last, uint k, con
         const clr_real before = is_first ? clr_lost_before(planes, s, at) : block->doubt[v];
         const clr_real doubt = clr_fma(m, zero, clr_fma(t, zero, before));
         below += clr_one_where(m < zero) + clr_one_where(t < zero);
-        const clr_moments moments = clr_moments_add(is_first ? clr_load_moments(planes, s, at) : block->moments[v], m, t, e);
+        const clr_moments moments =
+            clr_moments_add(is_first ? clr_load_moments(planes, s, at) : block->moments[v], m, t, e, s.batches + k);
         if (!is_last) {
             block->moments[v] = moments;
             block->doubt[v] = doubt;
@@ -100,7 +101,7 @@ static inline void clr_add_vector(const clr_inputs* in, const clr_batches* batch
             clr_two_make(bad ? zero : (clr_real)(batch.weight_hi), bad ? zero : (clr_real)(batch.weight_lo));
         const clr_two sum = clr_two_add(r.weight, added);
         const clr_entry e = clr_entry_make(r.weight, added, sum);
-        r.moments = clr_moments_add(r.moments, bad ? zero : m, bad ? zero : t, e);
+        r.moments = clr_moments_add(r.moments, bad ? zero : m, bad ? zero : t, e, s.batches + k);
         if (s.options & CLR_STATE_RATIOS) r.ratios = clr_ratios_add(r.ratios, bad ? zero : m, bad ? zero : t, e);
         r.weight = sum;
         r.batches += clr_one_where(!bad);

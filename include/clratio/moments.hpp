@@ -33,9 +33,9 @@ struct HostBatch {
     double weight = 1;
 };
 
-/// The device buffers of a state. A plane is plane_stride() float32 of hi parts, then as many lo parts; `batches` is a
-/// single plane_stride() of uint32. weight and batches exist with NonFinite::skip, the last three with `ratios`, and are
-/// null otherwise.
+/// The device buffers of a state. A plane is plane_stride() float32 of hi parts, then as many lo parts; its value is hi +
+/// lo, where hi may be some ulps off the nearest float; `batches` is a single plane_stride() of uint32. weight and batches
+/// exist with NonFinite::skip, the last three with `ratios`, and are null otherwise.
 struct StatePlanes {
     cl_mem m = nullptr, t = nullptr;                                    ///< means
     cl_mem mm = nullptr, tt = nullptr, mt = nullptr;                    ///< second moments about the means

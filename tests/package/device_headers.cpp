@@ -35,10 +35,11 @@ std::vector<float> uniform(std::uint64_t seed) {
 struct Value {
     clr_moments moments{};
     clr_two weight{};
+    std::uint32_t added = 0;
 
     void add(float m, float t) {
         const clr_two one{1, 0}, sum = clr_two_add(weight, one);
-        moments = clr_moments_add(moments, m, t, clr_entry_make(weight, one, sum));
+        moments = clr_moments_add(moments, m, t, clr_entry_make(weight, one, sum), added++);
         weight = sum;
     }
     float estimate() const {

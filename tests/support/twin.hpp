@@ -12,16 +12,20 @@ struct TwinValue {
     device::clr_moments moments{};
     device::clr_ratios ratios{};
     device::clr_two weight{};
-    std::uint32_t batches = 0;
+    std::uint32_t batches = 0, offered = 0;
 
     void add(float m, float t, double w) {
         using namespace device;
-        if (!clr_is_finite(m) || !clr_is_finite(t)) return;
+        const std::uint32_t index = offered++;
+        if (!clr_is_finite(m) || !clr_is_finite(t)) {
+            if (clr_settles(index)) moments = clr_moments_settle(moments);
+            return;
+        }
         const auto hi = static_cast<float>(w);
         const clr_two added{hi, static_cast<float>(w - static_cast<double>(hi))};
         const clr_two sum = clr_two_add(weight, added);
         const clr_entry entry = clr_entry_make(weight, added, sum);
-        moments = clr_moments_add(moments, m, t, entry);
+        moments = clr_moments_add(moments, m, t, entry, index);
         ratios = clr_ratios_add(ratios, m, t, entry);
         weight = sum;
         ++batches;
@@ -35,6 +39,7 @@ struct TwinValue {
         ratios = clr_ratios_merge(ratios, b.ratios, entry);
         weight = sum;
         batches += b.batches;
+        offered += b.offered;
     }
 
     device::clr_estimate read(float tau, std::uint32_t added, std::uint32_t estimator = CLR_ESTIMATOR_RATIO,

@@ -143,6 +143,7 @@ CLR_FN clr_estimate clr_read_means(clr_real m, clr_real t, clr_real tau, clr_u32
 // the error is only told to be finite or infinite.
 CLR_FN clr_estimate clr_read_out(clr_moments s, clr_ratios q, clr_evidence n, clr_u32 added, clr_real tau, clr_u32 estimator,
                                  clr_u32 zero_policy, bool with_error) {
+    s = clr_moments_settle(s);
     clr_estimate e;
     if (estimator == CLR_ESTIMATOR_MEAN)
         e = clr_plain_mean(s, n);

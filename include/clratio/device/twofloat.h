@@ -57,16 +57,28 @@ CLR_FN clr_two clr_two_subtract(clr_two x, clr_two y) {
     return clr_two_quick_sum(s.hi, s.lo + (x.lo - y.lo));
 }
 
-// a - y for a plain a, rounding error below 2^-47 |y|.
-CLR_FN clr_two clr_two_distance(clr_real a, clr_two y) {
-    const clr_two s = clr_two_difference(a, y.hi);
-    return clr_two_quick_sum(s.hi, s.lo - y.lo);
+// Loose pairs: hi need not be the nearest float of the sum, and lo may be many of its ulps. They are what a long sum can
+// afford.
+
+// x + y as a loose pair, where x may be one: rounding error below 2^-24 of the new lo.
+CLR_FN clr_two clr_two_gather(clr_two x, clr_two y) {
+    const clr_two s = clr_two_sum(x.hi, y.hi);
+    return clr_two_make(s.hi, x.lo + (s.lo + y.lo));
 }
 
-// x * y, rounding error below 2^-45 |x y|, as a loose pair: hi is within 2 ulp of the nearest float of the sum.
+// A loose pair made tight again.
+CLR_FN clr_two clr_two_settle(clr_two x) { return clr_two_quick_sum(x.hi, x.lo); }
+
+// a - y as a loose pair, for a plain a: rounding error below 2^-24 of the new lo.
+CLR_FN clr_two clr_two_distance(clr_real a, clr_two y) {
+    const clr_two s = clr_two_difference(a, y.hi);
+    return clr_two_make(s.hi, s.lo - y.lo);
+}
+
+// x * y as a loose pair; x and y may be loose: rounding error below 2^-24 of the new lo.
 CLR_FN clr_two clr_two_multiply(clr_two x, clr_two y) {
     const clr_two p = clr_two_product(x.hi, y.hi);
-    return clr_two_make(p.hi, clr_fma(x.hi, y.lo, clr_fma(x.lo, y.hi, p.lo)));
+    return clr_two_make(p.hi, clr_fma(x.lo, y.lo, clr_fma(x.hi, y.lo, clr_fma(x.lo, y.hi, p.lo))));
 }
 
 // x / y, relative error below 2^-43; y.hi != 0.
