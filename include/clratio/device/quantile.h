@@ -39,7 +39,7 @@ CLR_FN clr_real clr_minus_log_scaled(clr_real u) {
 
 // The standard normal quantile at the midpoint (h + 1/2) 2^-32: with the tail probability p = k 2^-33 <= 1/2, k = 2 j + 1,
 // x = 1 - 2 p (each rounded once) and w = -log(4 p (1 - p)), |z| = x N(w) / D(w). Odd; |z| from 2.9e-10 to 6.338.
-// At most 8 ulp and 6e-7 relative after the division. The coefficients are the spec's minimax fit, N's scaled by 2^-32.
+// At most 8 ulp and 6e-7 relative after the division. The coefficients are a minimax fit in w, N's scaled by 2^-32.
 CLR_FN clr_fraction clr_normal_fraction(clr_uint h) {
     const clr_uint upper_half = (clr_uint)(0u) - (h >> 31);
     const clr_uint twice_j = (h ^ upper_half) << 1;
