@@ -77,7 +77,8 @@ cl_event combine(const Moments& moments, View tau, const CombineOutput& out, Com
                  std::span<const cl_event> wait_list = {});
 Combined combine(const Moments& moments, const Tau& tau, CombineOptions options = {});
 
-/// Adds batches and reads out, the last 8 of them in the same pass: for progressive display, and where all batches are there.
+/// Adds batches and reads out, the last 8 of them in the same pass: for progressive display, and where all batches are
+/// there.
 Combined add_and_combine(Moments& moments, std::span<const HostBatch> batches, const Tau& tau, CombineOptions options = {});
 /// At most 8 batches, one launch.
 cl_event add_and_combine(Moments& moments, std::span<const Batch> batches, View tau, const CombineOutput& out,
