@@ -92,6 +92,8 @@ void Buffer::publish() const {
 
 namespace {
 
+constexpr std::uint64_t block = 32;  // vectors: ranges are cut between whole blocks of kernels/moments.cl
+
 std::uint64_t most_groups(const Engine::State& s) { return 64ull * std::max(1u, s.info.compute_units); }
 
 bool same_elements(const View& a, const View& b) {
@@ -157,8 +159,9 @@ Event Launch::run_ranges(std::uint64_t count) {
         const std::uint64_t groups = std::min<std::uint64_t>((vectors + s.work_items - 1) / s.work_items, most_groups(s));
         return enqueue(groups * s.work_items, s.work_items);
     }
-    const std::uint64_t items = std::min<std::uint64_t>(s.work_items, vectors);
-    arg(device::clr_range{count, (vectors + items - 1) / items});
+    const std::uint64_t blocks = (vectors + block - 1) / block;
+    const std::uint64_t items = std::min<std::uint64_t>(s.work_items, blocks);
+    arg(device::clr_range{count, (blocks + items - 1) / items * block});
     return enqueue(items, 1);
 }
 

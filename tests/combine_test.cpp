@@ -17,7 +17,7 @@ using namespace clratio::test;
 
 namespace {
 
-constexpr std::size_t values = 999;
+constexpr std::size_t values = 5001;
 constexpr float not_a_number = std::numeric_limits<float>::quiet_NaN();
 
 struct Pair {

@@ -15,7 +15,7 @@ using namespace clratio::test;
 
 namespace {
 
-constexpr std::size_t values = 1003;  // no multiple of any width
+constexpr std::size_t values = 5003;  // no multiple of any width
 constexpr float not_a_number = std::numeric_limits<float>::quiet_NaN();
 
 struct Input {
@@ -193,11 +193,11 @@ TEST(Moments, misuse_is_refused_by_name) {
         }
     };
     refused([&] { Moments(engine, 0); }, "values");
-    refused([&] { s.add(good, shorter); }, "t: expected 1003 values, got 1002");
-    refused([&] { s.add(shorter, good); }, "m: expected 1003 values, got 1002");
+    refused([&] { s.add(good, shorter); }, "t: expected 5003 values, got 5002");
+    refused([&] { s.add(shorter, good); }, "m: expected 5003 values, got 5002");
     for (const double weight : {0.0, -1.0, std::nan(""), std::numeric_limits<double>::infinity()})
         refused([&] { s.add(good, good, weight); }, "weight");
-    refused([&] { s.merge(Moments(engine, values + 1)); }, "merge: expected 1003 values");
+    refused([&] { s.merge(Moments(engine, values + 1)); }, "merge: expected 5003 values");
     refused([&] { s.merge(Moments(another, values)); }, "same Engine");
     refused([&] { s.merge(Moments(engine, values, {.ratios = true})); }, "same options");
     refused([&] { s.add(std::span<const Batch>{}, {}); }, "batches");
