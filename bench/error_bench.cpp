@@ -1,6 +1,7 @@
 // Error samples to memory, eq. (14): this library, the same maths in vector instructions, and what others write.
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
 #include <vector>
 
 #include "classic.hpp"
@@ -33,10 +34,19 @@ template <class T> void clratio_samples(benchmark::State& state, Generator gener
 void error_samples_float(benchmark::State& state, Generator generator) { clratio_samples<float>(state, generator); }
 void error_samples_double(benchmark::State& state, Generator generator) { clratio_samples<double>(state, generator); }
 
+bool same_work(const peers::NativeSet& set, Generator generator) {
+    const Stream stream{.seed = 1, .generator = generator};
+    std::vector<float> out(4096);
+    peers::native_samples(set, law, stream, 0, out);
+    std::uint64_t i = 0;
+    return std::ranges::all_of(out, [&](float x) { return x == error_sample(law, stream, i++); });
+}
+
 void native(benchmark::State& state, Generator generator) {
     const auto* set = peers::native_set();
     if (!set) return state.SkipWithError("this machine has neither AVX-512 nor AVX2");
     state.SetLabel(set->name);
+    if (!same_work(*set, generator)) return state.SkipWithError("the native samples are not the library's");
     measure<float>(state, samples, [&](std::uint64_t first, std::span<float> out) {
         peers::native_samples(*set, law, {.seed = 1, .generator = generator}, first, out);
     });

@@ -1,6 +1,7 @@
 // Error samples drawn and counted in one go: this library, and the same maths in vector instructions.
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
 #include <vector>
 
 #include "clratio/histogram.hpp"
@@ -43,12 +44,23 @@ void models_10000(benchmark::State& state, Generator generator) {
     fused(state, generator, 10000, Precision::single_precision);
 }
 
+constexpr peers::Binning binning{-2, 4, 1024 / 6.0f, 1024};
+
+bool same_work(const peers::NativeSet& set, const Stream& stream) {
+    constexpr std::uint64_t count = 1 << 16;
+    std::vector<std::uint64_t> row(bins.count + 3);
+    peers::native_histogram(set, law, stream, 0, count, binning, row);
+    return std::ranges::equal(std::span(row).first(bins.count),
+                              error_histogram(Engine{}, law, stream, {0, count}, bins).bins);
+}
+
 void native(benchmark::State& state, Generator generator) {
     const auto* set = peers::native_set();
     if (!set) return state.SkipWithError("this machine has neither AVX-512 nor AVX2");
     state.SetLabel(set->name);
+    if (!same_work(*set, {.seed = 1, .generator = generator}))
+        return state.SkipWithError("the native counts are not the library's");
     std::vector<std::uint64_t> row(bins.count + 3);
-    const peers::Binning binning{-2, 4, 1024 / 6.0f, 1024};
     measure(state, samples, samples, [&](std::uint64_t first) {
         peers::native_histogram(*set, law, {.seed = 1, .generator = generator}, first, samples, binning, row);
     });

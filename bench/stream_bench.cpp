@@ -1,8 +1,9 @@
-// Words, uniform and normal numbers of a stream, to memory.
+// Words, uniform and normal numbers of a stream, to memory; beside them the normals of Boost.Compute on the same device.
 #include <benchmark/benchmark.h>
 
 #include <vector>
 
+#include "boost_compute.hpp"
 #include "clratio/stream.hpp"
 
 namespace {
@@ -43,11 +44,20 @@ void normals_float(benchmark::State& state, Generator generator) { normals<float
 void normals_double(benchmark::State& state, Generator generator) { normals<double>(state, generator); }
 void uniforms_float(benchmark::State& state, Generator generator) { uniforms<float>(state, generator); }
 
+void boost_compute_normals(benchmark::State& state) {
+    constexpr std::size_t count = draws / 8;
+    const auto fill = peers::boost_normals(Engine{}, count);
+    fill();
+    for (auto _ : state) fill();
+    state.SetItemsProcessed(static_cast<std::int64_t>(state.iterations() * count));
+}
+
 BENCHMARK_CAPTURE(words, pcg4d3x, Generator::pcg4d3x)->MeasureProcessCPUTime()->UseRealTime();
 BENCHMARK_CAPTURE(words, philox, Generator::philox)->MeasureProcessCPUTime()->UseRealTime();
 BENCHMARK_CAPTURE(uniforms_float, philox, Generator::philox)->MeasureProcessCPUTime()->UseRealTime();
 BENCHMARK_CAPTURE(normals_float, pcg4d3x, Generator::pcg4d3x)->MeasureProcessCPUTime()->UseRealTime();
 BENCHMARK_CAPTURE(normals_float, philox, Generator::philox)->MeasureProcessCPUTime()->UseRealTime();
 BENCHMARK_CAPTURE(normals_double, philox, Generator::philox)->MeasureProcessCPUTime()->UseRealTime();
+BENCHMARK(boost_compute_normals)->MeasureProcessCPUTime()->UseRealTime();
 
 }  // namespace

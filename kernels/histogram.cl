@@ -37,7 +37,7 @@ static inline void clr_count_some(CLR_COUNTERS uint* counters, clr_uint slots, l
 
 #if !CLR_GROUPED
 // The slots of one step are counted in the next, read back from memory: taking a vector's lanes out one by one would compete
-// with the arithmetic for the vector unit. Measured: about 1.1 times as fast.
+// with the arithmetic for the vector unit. Measured on PoCL with AVX-512: 1.09 times as fast.
 typedef struct {
     local uint* slots;  // two steps of 2 CLR_WIDTH
     uint next;          // where the next step goes

@@ -13,7 +13,10 @@ build_packages=(
 test_packages=(libgtest-dev clang-format-14 oclgrind git)
 # To build the benchmarks.
 # shellcheck disable=SC2034
-bench_packages=(libbenchmark-dev librandom123-dev python3-numpy)
+bench_packages=(libbenchmark-dev librandom123-dev)
+# The peers that are not compiled; Intel MKL is timed where the loader finds libmkl_rt.
+# shellcheck disable=SC2034
+peer_packages=(python3 python3-numpy python3-pyopencl)
 
 installed() { [[ $(dpkg-query --show --showformat='${db:Status-Status}' "$1" 2>/dev/null) == installed ]]; }
 

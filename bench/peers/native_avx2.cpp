@@ -28,6 +28,7 @@ struct V {
     static U and_not(U a, U b) { return _mm256_andnot_si256(a, b); }
     static U bit_or(U a, U b) { return _mm256_or_si256(a, b); }
     static U bit_xor(U a, U b) { return _mm256_xor_si256(a, b); }
+    static U bit_xor(U a, U b, U c) { return bit_xor(bit_xor(a, b), c); }
     template <int n> static U shift_left(U a) { return _mm256_slli_epi32(a, n); }
     template <int n> static U shift_right(U a) { return _mm256_srli_epi32(a, n); }
     template <int n> static U shift_right_signed(U a) { return _mm256_srai_epi32(a, n); }

@@ -28,6 +28,7 @@ struct V {
     static U and_not(U a, U b) { return _mm512_andnot_si512(a, b); }
     static U bit_or(U a, U b) { return _mm512_or_si512(a, b); }
     static U bit_xor(U a, U b) { return _mm512_xor_si512(a, b); }
+    static U bit_xor(U a, U b, U c) { return _mm512_ternarylogic_epi32(a, b, c, 0x96); }
     template <int n> static U shift_left(U a) { return _mm512_slli_epi32(a, n); }
     template <int n> static U shift_right(U a) { return _mm512_srli_epi32(a, n); }
     template <int n> static U shift_right_signed(U a) { return _mm512_srai_epi32(a, n); }

@@ -50,71 +50,79 @@ template <class V> struct NativeKernels {
 
     using Words = std::array<U, 4>;
 
-    static Words philox_half(U c0, U c1, U c2, U c3, std::uint64_t seed) {
-        std::uint32_t k0 = static_cast<std::uint32_t>(seed), k1 = static_cast<std::uint32_t>(seed >> 32);
+    /// Rounds on 64-bit lanes whose high halves are never cleared, the even and the odd lanes side by side; the round keys
+    /// are spread over the lanes once.
+    struct Philox {
+        explicit Philox(const clratio::Stream& stream) : id(V::set_word(stream.id)), domain(V::set_word(CLR_DOMAIN_ERROR)) {
+            const auto k0 = static_cast<std::uint32_t>(stream.seed), k1 = static_cast<std::uint32_t>(stream.seed >> 32);
+            for (std::uint32_t round = 0; round < 10; ++round) {
+                key0[round] = V::set_wide(k0 + round * 0x9e3779b9u);
+                key1[round] = V::set_wide(k1 + round * 0xbb67ae85u);
+            }
+        }
+
+        void round(Words& c, std::size_t r) const {
+            const U p0 = V::mul_wide(c[0], V::set_word(0xd2511f53u)), p1 = V::mul_wide(c[2], V::set_word(0xcd9e8d57u));
+            c = {V::bit_xor(V::high(p1), c[1], key0[r]), p1, V::bit_xor(V::high(p0), c[3], key1[r]), p0};
+        }
+
+        Words operator()(std::uint64_t block) const {
+            const U low = V::add(V::set_word(static_cast<std::uint32_t>(block)), V::lanes());
+            const U high = V::set_word(static_cast<std::uint32_t>(block >> 32));
+            Words even{low, high, id, domain}, odd{V::high(low), high, id, domain};
 #pragma GCC unroll 10
-        for (int round = 0; round < 10; ++round) {
-            const U p0 = V::mul_wide(c0, V::set_word(0xd2511f53u)), p1 = V::mul_wide(c2, V::set_word(0xcd9e8d57u));
-            c0 = V::bit_xor(V::bit_xor(V::high(p1), c1), V::set_wide(k0));
-            c2 = V::bit_xor(V::bit_xor(V::high(p0), c3), V::set_wide(k1));
-            c1 = p1;
-            c3 = p0;
-            k0 += 0x9e3779b9u;
-            k1 += 0xbb67ae85u;
+            for (std::size_t r = 0; r < 10; ++r) {
+                round(even, r);
+                round(odd, r);
+            }
+            for (std::size_t i = 0; i < 4; ++i) even[i] = V::join(even[i], odd[i]);
+            return even;
         }
-        return {c0, c1, c2, c3};
-    }
 
-    static Words philox(const clratio::Stream& stream, std::uint64_t block) {
-        const U low = V::add(V::set_word(static_cast<std::uint32_t>(block)), V::lanes());
-        const U high = V::set_word(static_cast<std::uint32_t>(block >> 32));
-        const U id = V::set_word(stream.id), domain = V::set_word(CLR_DOMAIN_ERROR);
-        const Words even = philox_half(low, high, id, domain, stream.seed);
-        const Words odd = philox_half(V::high(low), high, id, domain, stream.seed);
-        Words w;
-        for (int i = 0; i < 4; ++i) w[i] = V::join(even[i], odd[i]);
-        return w;
-    }
+        U id, domain;
+        std::array<U, 10> key0, key1;
+    };
 
-    static Words pcg4d3x(const clratio::Stream& stream, std::uint64_t block) {
-        const U a = V::set_word(1664525u), c = V::set_word(1013904223u);
-        const U low = V::add(V::set_word(static_cast<std::uint32_t>(block)), V::lanes());
-        const U high = V::set_word(static_cast<std::uint32_t>(block >> 32) | CLR_DOMAIN_ERROR << 28);
-        Words v{low, high, V::set_word(stream.id), V::set_word(static_cast<std::uint32_t>(stream.seed))};
-        for (U& x : v) x = V::add(V::mul_low(x, a), c);
+    struct Pcg4d3x {
+        explicit Pcg4d3x(const clratio::Stream& stream)
+            : id(start(V::set_word(stream.id))), seed(start(V::set_word(static_cast<std::uint32_t>(stream.seed)))) {}
+
+        static U start(U x) { return V::add(V::mul_low(x, V::set_word(1664525u)), V::set_word(1013904223u)); }
+
+        Words operator()(std::uint64_t block) const {
+            const U low = V::add(V::set_word(static_cast<std::uint32_t>(block)), V::lanes());
+            const U high = V::set_word(static_cast<std::uint32_t>(block >> 32) | CLR_DOMAIN_ERROR << 28);
+            Words v{start(low), start(high), id, seed};
 #pragma GCC unroll 3
-        for (int round = 0; round < 3; ++round) {
-            v[0] = V::add(v[0], V::mul_low(v[1], v[3]));
-            v[1] = V::add(v[1], V::mul_low(v[2], v[0]));
-            v[2] = V::add(v[2], V::mul_low(v[0], v[1]));
-            v[3] = V::add(v[3], V::mul_low(v[1], v[2]));
-            for (U& x : v) x = V::bit_xor(x, V::template shift_right<16>(x));
+            for (int round = 0; round < 3; ++round) {
+                v[0] = V::add(v[0], V::mul_low(v[1], v[3]));
+                v[1] = V::add(v[1], V::mul_low(v[2], v[0]));
+                v[2] = V::add(v[2], V::mul_low(v[0], v[1]));
+                v[3] = V::add(v[3], V::mul_low(v[1], v[2]));
+                for (U& x : v) x = V::bit_xor(x, V::template shift_right<16>(x));
+            }
+            return v;
         }
-        return v;
-    }
 
-    template <clratio::Generator generator> static Words draw(const clratio::Stream& stream, std::uint64_t block) {
-        if constexpr (generator == clratio::Generator::philox) return philox(stream, block);
-        return pcg4d3x(stream, block);
-    }
+        U id, seed;
+    };
 
-    template <clratio::Generator generator, class Take>
-    static void each(clratio::device::clr_canonical law, const clratio::Stream& stream, std::uint64_t first,
-                     std::uint64_t count, Take take) {
-        const Law wide{V::set(law.s), V::set(law.a), V::set(law.b)};
+    template <class Source, class Take>
+    static void each(const Law& law, const Source& draw, std::uint64_t first, std::uint64_t count, Take take) {
         for (std::uint64_t i = 0; i < count; i += 2 * V::lane_count) {
-            const Words w = draw<generator>(stream, (first + i) / 2);
-            take(i, sample(wide, w[0], w[1]), sample(wide, w[2], w[3]));
+            const Words w = draw((first + i) / 2);
+            take(i, sample(law, w[0], w[1]), sample(law, w[2], w[3]));
         }
     }
 
     template <class Take>
     static void each(clratio::device::clr_canonical law, const clratio::Stream& stream, std::uint64_t first,
                      std::uint64_t count, Take take) {
+        const Law wide{V::set(law.s), V::set(law.a), V::set(law.b)};
         if (stream.generator == clratio::Generator::philox)
-            each<clratio::Generator::philox>(law, stream, first, count, take);
+            each(wide, Philox(stream), first, count, take);
         else
-            each<clratio::Generator::pcg4d3x>(law, stream, first, count, take);
+            each(wide, Pcg4d3x(stream), first, count, take);
     }
 
     static void samples(clratio::device::clr_canonical law, clratio::Stream stream, std::uint64_t first, std::uint64_t count,

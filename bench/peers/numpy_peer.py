@@ -1,34 +1,40 @@
 #!/usr/bin/env python3
-"""What a NumPy user writes: error samples by eq. (14) in canonical form, then np.histogram. One core; prints million samples a second."""
-import time
+"""What a NumPy user writes: float32 normals, error samples by eq. (14), np.histogram; one process a core."""
+import sys
 
-import numpy as np
+import peer
 
-S, A, B = 0.35, -0.175, 0.5  # mu .5, tau 1, sigma_m .5, sigma_t .35, rho 0
+try:
+    import numpy as np
+except ImportError as reason:
+    peer.skip(reason)
+    sys.exit()
+
 COUNT = 1 << 22
 
 
-def samples(generator):
-    z = generator.standard_normal((2, COUNT), dtype=np.float32)
-    return (np.float32(A) * z[1] + np.float32(B) * z[0]) / (1 + np.float32(S) * z[1])
+def measure(core):
+    generator = np.random.Generator(np.random.Philox(1 + core))
+    repetitions = int(sys.argv[1])
 
+    def normals():
+        return generator.standard_normal(COUNT, dtype=np.float32)
 
-def median_rate(work, repetitions=5):
-    seconds = []
-    for _ in range(repetitions):
-        start = time.process_time()
-        work()
-        seconds.append(time.process_time() - start)
-    return COUNT / sorted(seconds)[len(seconds) // 2] / 1e6
+    def samples():
+        z1, z2 = normals(), normals()
+        return (np.float32(peer.A) * z2 + np.float32(peer.B) * z1) / (1 + np.float32(peer.S) * z2)
 
+    def count(x):
+        return np.histogram(x, bins=peer.BINS, range=(peer.LO, peer.HI))
 
-def main():
-    generator = np.random.Generator(np.random.Philox(1))
-    x = samples(generator)
-    print(f"numpy_samples    {median_rate(lambda: samples(generator)):8.1f} M/s a core")
-    print(f"numpy_histogram  {median_rate(lambda: np.histogram(x, bins=1024, range=(-2, 4))):8.1f} M/s a core")
-    print(f"numpy_fused      {median_rate(lambda: np.histogram(samples(generator), bins=1024, range=(-2, 4))):8.1f} M/s a core")
+    x = samples()
+    return {
+        "normals": peer.rate(normals, COUNT, repetitions),
+        "samples": peer.rate(samples, COUNT, repetitions),
+        "histogram": peer.rate(lambda: count(x), COUNT, repetitions),
+        "fused": peer.rate(lambda: count(samples()), COUNT, repetitions),
+    }
 
 
 if __name__ == "__main__":
-    main()
+    peer.report(peer.on_all_cores(measure))

@@ -77,6 +77,7 @@ void scaling_limit(benchmark::State& state, std::uint64_t bytes) {
     if (!fits(state, engine, 4 * count, 4 * count)) return;
     const Array x(engine, count, 1.0f);
     cl_kernel kernel = scaling_kernel(engine);
+    finish(scale(engine, kernel, x.mem(), count));
     for (auto _ : state) finish(scale(engine, kernel, x.mem(), count));
     clReleaseKernel(kernel);
     report(state, count, 8 * count);

@@ -1,5 +1,7 @@
 // One vocabulary for OpenCL C 1.2 and C++: the only file that asks which compiler reads it.
 // OpenCL C: types of CLR_WIDTH lanes (1, 2, 4, 8, 16). C++: one lane, inside clratio::device.
+// clr_pairs: 64-bit lanes that hold the even, or the odd, 32-bit lanes in their low halves and anything in their high
+// halves. Below width 8 (where PoCL would take such short vectors apart) the even ones are all lanes, and the odd ones none.
 #ifndef CLRATIO_DEVICE_PORTABLE_H
 #define CLRATIO_DEVICE_PORTABLE_H
 
@@ -76,6 +78,23 @@ typedef CLR_JOIN(long, CLR_WIDTH) clr_double_mask;
 #endif
 #endif
 
+#if CLR_WIDTH < 8
+typedef clr_wide clr_pairs;
+#define clr_even_lanes(x) clr_to_wide(x)
+#define clr_odd_lanes(x) ((clr_pairs)(0))
+#define clr_interleave(even, odd) clr_to_uint(even)
+#else
+#if CLR_WIDTH == 8
+typedef ulong4 clr_pairs;
+#define clr_even_lanes(x) as_ulong4(x)
+#else
+typedef ulong8 clr_pairs;
+#define clr_even_lanes(x) as_ulong8(x)
+#endif
+#define clr_odd_lanes(x) (clr_even_lanes(x) >> 32)
+#define clr_interleave(even, odd) CLR_JOIN(as_uint, CLR_WIDTH)(((even) & (clr_pairs)(0xffffffffUL)) | ((odd) << 32))
+#endif
+
 #define clr_fma(a, b, c) fma(a, b, c)
 #define clr_sqrt(x) sqrt(x)
 #define clr_floor(x) floor(x)
@@ -107,6 +126,7 @@ using clr_uint = std::uint32_t;
 using clr_int = std::int32_t;
 using clr_mask = bool;
 using clr_wide = std::uint64_t;
+using clr_pairs = std::uint64_t;
 using clr_double = double;
 using clr_double_mask = bool;
 
@@ -114,6 +134,9 @@ template <class T> float clr_to_real(T x) { return static_cast<float>(x); }
 template <class T> clr_uint clr_to_uint(T x) { return static_cast<clr_uint>(x); }
 template <class T> clr_int clr_to_int(T x) { return static_cast<clr_int>(x); }
 template <class T> clr_wide clr_to_wide(T x) { return static_cast<clr_wide>(x); }
+inline clr_pairs clr_even_lanes(clr_uint x) { return x; }
+inline clr_pairs clr_odd_lanes(clr_uint) { return 0; }
+inline clr_uint clr_interleave(clr_pairs even, clr_pairs) { return static_cast<clr_uint>(even); }
 template <class T> double clr_to_double(T x) { return static_cast<double>(x); }
 inline clr_uint clr_bits(float x) { return std::bit_cast<clr_uint>(x); }
 inline float clr_from_bits(clr_uint x) { return std::bit_cast<float>(x); }

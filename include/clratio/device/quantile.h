@@ -20,8 +20,8 @@ typedef struct {
 
 // -log of u 2^-64, for 2^-64 <= u <= 2^64; absolute error below 2.5e-7 + 2^-23 of the result. The bits of u, read as an
 // integer, are 2^23 (exponent + mantissa - 1): a piecewise linear log2. What is left of the log, log(2) (m - 1) - log m for
-// a mantissa m in [1, 2), is small: a minimax polynomial of degree 7 in m - 3/2, 1.9e-7 from the truth. Measured: 4 % of a
-// sample's whole cost less than splitting off the exponent.
+// a mantissa m in [1, 2), is small: a minimax polynomial of degree 7 in m - 3/2, 1.9e-7 from the truth. Measured on PoCL
+// with AVX-512: 1.04 times the error samples of one that splits off the exponent.
 CLR_FN clr_real clr_minus_log_scaled(clr_real u) {
     const clr_uint bits = clr_bits(u);
     const clr_real linear = clr_to_real(clr_to_int((clr_uint)((127u + 64u) << 23) - bits));
