@@ -1,5 +1,6 @@
 #include "error_options.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 
@@ -35,7 +36,7 @@ namespace {
 
 std::string bar(double part) {
     constexpr std::size_t width = 40;
-    const auto full = static_cast<std::size_t>(part * width);
+    const auto full = std::min(static_cast<std::size_t>(part * width), width);
     return fmt::format("[{}{}] {:3.0f} %", std::string(full, '='), std::string(width - full, ' '), 100 * part);
 }
 
@@ -43,11 +44,10 @@ std::string bar(double part) {
 
 clratio::Progress SampleProgress::next(std::uint64_t count) {
     before_ = after_;
-    after_ += count;
+    after_ += static_cast<double>(count);
     return [this](std::uint64_t done, std::uint64_t) {
-        const auto samples = static_cast<double>(before_ + done);
-        line_.show(
-            fmt::format("{} of {:.3g} samples", bar(samples / static_cast<double>(total_)), static_cast<double>(total_)));
+        const double samples = before_ + static_cast<double>(done);
+        line_.show(fmt::format("{} of {:.3g} samples", bar(samples / total_), total_));
         return !interrupt_.asked();
     };
 }

@@ -23,16 +23,16 @@ struct StreamOptions {
     clratio::Stream stream() const;
 };
 
-/// A bar for `total` samples in several calls, and Ctrl-C in between: clratio::Cancelled out of the call.
+/// A bar for `total` samples, at least one, in several calls, and Ctrl-C in between: clratio::Cancelled out of the call.
 class SampleProgress {
 public:
-    explicit SampleProgress(std::uint64_t total) : total_(total) {}
+    explicit SampleProgress(double total) : total_(total) {}
 
     /// For the next call, which will draw `count` samples.
     clratio::Progress next(std::uint64_t count);
 
 private:
-    std::uint64_t total_, before_ = 0, after_ = 0;
+    double total_, before_ = 0, after_ = 0;
     ProgressLine line_;
     Interrupt interrupt_;
 };

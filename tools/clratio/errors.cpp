@@ -56,7 +56,7 @@ std::vector<ErrorCounts> count_all(const clratio::Engine& engine, const Plan& pl
     one(plan.models.front(), {});  // programs are built here, so that no model's time has it
     sampling.range = range;
 
-    SampleProgress progress(range.count * plan.models.size());
+    SampleProgress progress(static_cast<double>(range.count) * static_cast<double>(plan.models.size()));
     std::vector<ErrorCounts> all;
     for (const auto& model : plan.models) {
         all.push_back(one(model, progress.next(range.count)));
@@ -88,17 +88,18 @@ Drawing drawing_of(const Plan& plan, const std::vector<ErrorCounts>& all) {
         const auto points = density_points(all[i], 256);
         for (const auto& p : points) panel.most_density = std::max(panel.most_density, 1.08 * p.density);
         panel.curves.push_back({"", Curve::Style::dashed, colour, density_curve(all[i].published(), bins.lo, bins.hi)});
-        panel.curves.push_back({"", Curve::Style::line, colour, density_curve(all[i].exact(), bins.lo, bins.hi)});
+        panel.curves.push_back({"", Curve::Style::thin, colour, density_curve(all[i].exact(), bins.lo, bins.hi)});
         panel.curves.push_back({fmt::format("N = {}", all[i].model.n), Curve::Style::dots, colour, points});
     }
     if (!(panel.most_density > 0)) panel.most_density = 1;
-    panel.curves.push_back({"exact law", Curve::Style::line, "#606060", {}});
+    panel.curves.push_back({"samples", Curve::Style::dots, "#606060", {}});
+    panel.curves.push_back({"exact law", Curve::Style::thin, "#606060", {}});
     panel.curves.push_back({all[0].estimator == Estimator::mc ? "published eq. (23)" : "published eq. (22)",
                             Curve::Style::dashed,
                             "#606060",
                             {}});
-    return {fmt::format("Error of the {} estimator, {:.3g} samples", name_of(plan.estimator),
-                        static_cast<double>(plan.sampling.range.count)),
+    return {fmt::format("error of the {} estimator, {} samples", plan.estimator == Estimator::mc ? "Monte Carlo" : "ratio",
+                        power_of_ten(plan.sampling.range.count)),
             {panel}};
 }
 

@@ -23,7 +23,8 @@ clratio::ErrorModel model_of(std::uint64_t n) {
 using Figure = std::vector<ErrorCounts>;  // those of mc, then those of the ratio
 
 Panel panel_of(const Figure& figure, Estimator estimator, bool samples) {
-    Panel panel{estimator == Estimator::mc ? "Monte Carlo (MC)" : "ratio estimator (RE)", most_density, lo, hi, {}};
+    const auto law_style = samples ? Curve::Style::thin : Curve::Style::line;
+    Panel panel{estimator == Estimator::mc ? "Monte Carlo (MC)" : "Ratio estimator (RE)", most_density, lo, hi, {}};
     std::size_t i = 0;
     for (const auto& counts : figure) {
         if (counts.estimator != estimator) continue;
@@ -31,11 +32,11 @@ Panel panel_of(const Figure& figure, Estimator estimator, bool samples) {
         const std::string title = fmt::format("N = {}", counts.model.n);
         if (estimator == Estimator::ratio)
             panel.curves.push_back({"", Curve::Style::dashed, colour, density_curve(counts.published(), lo, hi)});
-        panel.curves.push_back({samples ? "" : title, Curve::Style::line, colour, density_curve(counts.exact(), lo, hi)});
+        panel.curves.push_back({samples ? "" : title, law_style, colour, density_curve(counts.exact(), lo, hi)});
         if (samples) panel.curves.push_back({title, Curve::Style::dots, colour, density_points(counts, bins)});
     }
-    panel.curves.push_back(
-        {estimator == Estimator::mc ? "exact: eq. (23)" : "exact law", Curve::Style::line, "#606060", {}});
+    if (samples) panel.curves.push_back({"samples", Curve::Style::dots, "#606060", {}});
+    panel.curves.push_back({estimator == Estimator::mc ? "exact: eq. (23)" : "exact law", law_style, "#606060", {}});
     if (estimator == Estimator::ratio) panel.curves.push_back({"published eq. (22)", Curve::Style::dashed, "#606060", {}});
     return panel;
 }
@@ -66,7 +67,7 @@ void write_samples(const Figure& figure, const std::string& file) {
 
 Figure sampled(const clratio::Engine& engine, const Options& options) {
     Sampling sampling{options.stream.stream(), {0, whole_number("--count", options.count)}, {lo, hi, bins}};
-    SampleProgress progress(sampling.range.count * std::size(estimators) * std::size(sizes));
+    SampleProgress progress(static_cast<double>(sampling.range.count) * std::size(estimators) * std::size(sizes));
     Figure figure;
     for (const auto estimator : estimators)
         for (const auto n : sizes) {
@@ -85,9 +86,9 @@ int figures(const Options& options) {
     if (error) throw clratio::IoError(options.folder, "", "cannot be made a folder: " + error.message());
     require_gnuplot(options.folder);
     const Figure figure = sampled(clratio::Engine{}, options);
-    const double count = static_cast<double>(figure.front().histogram.total());
-    draw_figure(figure, folder / "figure1", "Figure 1: laws of the error of N samples", false);
-    draw_figure(figure, folder / "figure2", fmt::format("Figure 2: {:.3g} sampled errors for each N", count), true);
+    const std::uint64_t count = figure.front().histogram.total();
+    draw_figure(figure, folder / "figure1", "Figure 1: the law of the error after N samples", false);
+    draw_figure(figure, folder / "figure2", "Figure 2: " + power_of_ten(count) + " sampled errors of each", true);
     write_laws(figure, (folder / "figure1.csv").string());
     write_samples(figure, (folder / "figure2.csv").string());
     for (const char* name : {"figure1", "figure2"}) fmt::print("{0}.svg {0}.png {0}.csv\n", (folder / name).string());

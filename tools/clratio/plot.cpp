@@ -97,18 +97,38 @@ std::string style_of(const Curve& curve) {
     case Curve::Style::dashed:
         return fmt::format("lines linewidth 1 dashtype (9,5) linecolor rgb '{}'", curve.colour);
     case Curve::Style::dots:
-        return fmt::format("points pointtype 7 pointsize 0.28 linecolor rgb '{}'", curve.colour);
+        return fmt::format("points pointtype 7 pointsize 0.42 linecolor rgb '{}'", curve.colour);
     case Curve::Style::line:
+    case Curve::Style::thin:
         break;
     }
-    return fmt::format("lines linewidth 1.3 linecolor rgb '{}'", curve.colour);
+    return fmt::format("lines linewidth {} linecolor rgb '{}'", curve.style == Curve::Style::thin ? 0.7 : 1.3, curve.colour);
 }
 
-std::string data(const Curve& curve, const std::string& name) {
+// A point nearer than this part of the axis to it would only make the axis thicker.
+constexpr double least_visible = 1e-3;
+// Dots this far apart, in parts of the panel, are seen as dots.
+constexpr double dot_distance = .013;
+
+/// Which points are drawn: dots keep a distance.
+std::vector<Curve::Point> drawn(const Curve& curve, const Panel& panel) {
+    if (curve.style != Curve::Style::dots) return curve.points;
+    std::vector<Curve::Point> dots;
+    for (const auto& p : curve.points) {
+        const auto near = [&](const Curve::Point& q) {
+            return std::hypot((p.density - q.density) / panel.most_density,
+                              (p.error - q.error) / (panel.most_error - panel.least_error)) < dot_distance;
+        };
+        if (dots.empty() || !near(dots.back())) dots.push_back(p);
+    }
+    return dots;
+}
+
+std::string data(const Curve& curve, const Panel& panel, const std::string& name) {
     std::string text = name + " << EOD\n";
-    for (const auto& p : curve.points) text += fmt::format("{:.6g} {:.6g}\n", p.density, p.error);
-    if (curve.points.empty()) text += "NaN NaN\n";
-    return text + "EOD\n";
+    for (const auto& p : drawn(curve, panel))
+        text += p.density < least_visible * panel.most_density ? "\n" : fmt::format("{:.5g} {:.6g}\n", p.density, p.error);
+    return text + "NaN NaN\nEOD\n";
 }
 
 std::string plot(const Panel& panel) {
@@ -116,7 +136,7 @@ std::string plot(const Panel& panel) {
     for (std::size_t i = 0; i < panel.curves.size(); ++i) {
         const auto& curve = panel.curves[i];
         const std::string name = "$curve" + std::to_string(i);
-        blocks += data(curve, name);
+        blocks += data(curve, panel, name);
         parts += fmt::format("{}{} using 1:2 with {}{}", i ? ", \\\n     " : "plot ", name, style_of(curve),
                              curve.title.empty() ? "" : " title '" + curve.title + "'");
     }
@@ -144,6 +164,14 @@ std::string scale_colour(std::size_t i, std::size_t count) {
     for (std::size_t c = 0; c < 3; ++c)
         rgb[c] = static_cast<int>(std::lround(stops[low][c] * (1 - part) + stops[low + 1][c] * part));
     return fmt::format("#{:02x}{:02x}{:02x}", rgb[0], rgb[1], rgb[2]);
+}
+
+std::string power_of_ten(std::uint64_t count) {
+    const std::string short_form = fmt::format("{:.3g}", static_cast<double>(count));
+    const auto e = short_form.find("e+");
+    if (e == std::string::npos) return short_form;
+    const std::string mantissa = short_form.substr(0, e);
+    return (mantissa == "1" ? "" : mantissa + "·") + fmt::format("10^{{{}}}", std::stoi(short_form.substr(e + 2)));
 }
 
 void require_picture_name(const std::string& file) {

@@ -1,13 +1,14 @@
 // Pictures of error laws, drawn by gnuplot: density to the right, error upwards, as the supplement's figures have them.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
 namespace tool {
 
 struct Curve {
-    enum class Style { line, dashed, dots };
+    enum class Style { line, thin, dashed, dots };
     struct Point {
         double density, error;
     };
@@ -31,6 +32,9 @@ struct Drawing {
 
 /// Colour i of `count` along one scale, light to dark.
 std::string scale_colour(std::size_t i, std::size_t count);
+
+/// A count as enhanced text: 2.5·10^{8}.
+std::string power_of_ten(std::uint64_t count);
 
 /// UsageError for a name that ends neither in .svg nor in .png.
 void require_picture_name(const std::string& file);
