@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "clratio/exception.hpp"
+#include "clratio/histogram.hpp"
+#include "clratio/law.hpp"
 #include "quadrature.hpp"
 
 namespace clratio {
@@ -84,6 +86,19 @@ double anderson_darling_below(double z) {
     return std::clamp(std::sqrt(2 * pi) / z * sum, 0.0, 1.0);
 }
 
+std::vector<double> cell_probabilities(const Histogram& h, const ErrorLaw& law) {
+    return law.bin_probabilities(h.lo, h.hi, static_cast<std::uint32_t>(h.bins.size()));
+}
+
+Fit with_nan_rejected(Fit fit, const Histogram& h) {
+    if (h.nonfinite == 0) return fit;
+    fit.statistic = std::numeric_limits<double>::infinity();
+    fit.p = 0;
+    fit.q = 1;
+    fit.n += h.nonfinite;
+    return fit;
+}
+
 void check_unit(const char* name, std::span<const double> values) {
     for (double v : values)
         if (!(v >= 0 && v <= 1)) throw InvalidArgument(name, "values in [0, 1]", std::to_string(v));
@@ -124,6 +139,21 @@ Fit kolmogorov_smirnov(std::span<const std::uint64_t> counts, std::span<const do
     fit.p = x < 1 ? 1 - kolmogorov_below(x) : kolmogorov_above(x);
     fit.q = x < 1 ? kolmogorov_below(x) : 1 - kolmogorov_above(x);
     return fit;
+}
+
+std::vector<std::uint64_t> cells(const Histogram& histogram) {
+    std::vector<std::uint64_t> out{histogram.underflow};
+    out.insert(out.end(), histogram.bins.begin(), histogram.bins.end());
+    out.push_back(histogram.overflow);
+    return out;
+}
+
+Fit chi_square(const Histogram& histogram, const ErrorLaw& law, double least_expected) {
+    return with_nan_rejected(chi_square(cells(histogram), cell_probabilities(histogram, law), least_expected), histogram);
+}
+
+Fit kolmogorov_smirnov(const Histogram& histogram, const ErrorLaw& law) {
+    return with_nan_rejected(kolmogorov_smirnov(cells(histogram), cell_probabilities(histogram, law)), histogram);
 }
 
 Fit anderson_darling(std::span<const double> cdf, std::span<const double> sf) {

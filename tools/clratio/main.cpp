@@ -2,6 +2,7 @@
 #include <csignal>
 #include <cstdio>
 
+#include "clratio/exception.hpp"
 #include "tool.hpp"
 
 namespace {
@@ -11,6 +12,7 @@ constexpr auto footer = R"(Exit codes:
   1  failed: a file, a device (one line on stderr names it)
   2  usage: the arguments do not parse or do not fit together
   3  done, but values were flagged and --fail-on-flag was given
+  130  stopped by Ctrl-C
 
 Examples:
   clratio devices
@@ -19,7 +21,8 @@ Examples:
 
 The environment variable CLRATIO_DEVICE ("0:0", "cpu", "gpu", or a part of a name) chooses the device.)";
 
-constexpr auto add_commands = {tool::add_devices, tool::add_combine, tool::add_compare, tool::add_picture, tool::add_law};
+constexpr auto add_commands = {tool::add_devices, tool::add_combine, tool::add_compare, tool::add_picture,
+                               tool::add_law,     tool::add_errors,  tool::add_figures};
 
 int fail(const std::string& what, int code) {
     fmt::print(stderr, "clratio: {}\n", what);
@@ -45,6 +48,8 @@ int run_command(int argc, char** argv) {
         return run();
     } catch (const tool::UsageError& e) {
         return fail(e.what(), tool::usage);
+    } catch (const clratio::Cancelled& e) {
+        return fail(e.what(), tool::interrupted);
     } catch (const std::exception& e) {
         return fail(e.what(), tool::failed);
     }

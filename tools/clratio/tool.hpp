@@ -11,7 +11,7 @@
 
 namespace tool {
 
-enum Exit { ok = 0, failed = 1, usage = 2, flagged = 3 };
+enum Exit { ok = 0, failed = 1, usage = 2, flagged = 3, interrupted = 130 };
 
 /// Arguments that parse, but do not fit together: exit code 2.
 class UsageError : public std::runtime_error {
@@ -28,6 +28,8 @@ void add_combine(CLI::App& app, Run& run);
 void add_compare(CLI::App& app, Run& run);
 void add_picture(CLI::App& app, Run& run);
 void add_law(CLI::App& app, Run& run);
+void add_errors(CLI::App& app, Run& run);
+void add_figures(CLI::App& app, Run& run);
 
 /// Keys in the order they were set, as a reader would want them.
 using Json = nlohmann::ordered_json;

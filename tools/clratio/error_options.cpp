@@ -1,0 +1,55 @@
+#include "error_options.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+namespace tool {
+
+std::uint64_t whole_number(const std::string& option, const std::string& text) {
+    const char *const begin = text.data(), *const end = begin + text.size();
+    std::uint64_t whole = 0;
+    if (const auto [at, error] = std::from_chars(begin, end, whole); error == std::errc() && at == end) return whole;
+    double real = 0;
+    const auto [at, error] = std::from_chars(begin, end, real);
+    if (error != std::errc() || at != end || !(real >= 0 && real < 0x1p63) || real != std::floor(real))
+        throw UsageError(fmt::format("{}: expected a whole number, such as 1000000 or 1e6, got {}", option, text));
+    return static_cast<std::uint64_t>(real);
+}
+
+void StreamOptions::add_to(CLI::App& command) {
+    command.add_option("--seed", seed, "Seed of the stream")->type_name("WHOLE")->capture_default_str();
+    command.add_option("--stream", id, "Stream id of the first model; the next one has the next id")->capture_default_str();
+    command.add_option("--rng", rng, "philox, or pcg4d3x: faster, see docs/streams.md")
+        ->check(CLI::IsMember({"philox", "pcg4d3x"}))
+        ->type_name("WORD")
+        ->capture_default_str();
+}
+
+clratio::Stream StreamOptions::stream() const {
+    return {.seed = whole_number("--seed", seed),
+            .id = id,
+            .generator = rng == "philox" ? clratio::Generator::philox : clratio::Generator::pcg4d3x};
+}
+
+namespace {
+
+std::string bar(double part) {
+    constexpr std::size_t width = 40;
+    const auto full = std::min(static_cast<std::size_t>(part * width), width);
+    return fmt::format("[{}{}] {:3.0f} %", std::string(full, '='), std::string(width - full, ' '), 100 * part);
+}
+
+}  // namespace
+
+clratio::Progress SampleProgress::next(std::uint64_t count) {
+    before_ = after_;
+    after_ += static_cast<double>(count);
+    return [this](std::uint64_t done, std::uint64_t) {
+        const double samples = before_ + static_cast<double>(done);
+        line_.show(fmt::format("{} of {:.3g} samples", bar(samples / total_), total_));
+        return !interrupt_.asked();
+    };
+}
+
+}  // namespace tool
