@@ -28,6 +28,7 @@ void add_combine(CLI::App& app, Run& run);
 void add_compare(CLI::App& app, Run& run);
 void add_picture(CLI::App& app, Run& run);
 void add_law(CLI::App& app, Run& run);
+void add_audit(CLI::App& app, Run& run);
 
 /// Keys in the order they were set, as a reader would want them.
 using Json = nlohmann::ordered_json;
