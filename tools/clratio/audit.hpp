@@ -61,7 +61,7 @@ inline bool holds(const Number& n) {
 /// What the numbers are computed with.
 struct Work {
     clratio::Engine engine;
-    std::uint64_t samples;  ///< of an error law, and pairs (m, t) of a model
+    std::uint64_t samples;  ///< of an error law, and, up to a limit, pairs (m, t) of a model
 };
 
 /// A sentence or an equation of the supplement, and what became of it.

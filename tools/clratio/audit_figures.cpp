@@ -43,11 +43,10 @@ Numbers variance_without_correlation(const Work& work) {
     const Trial b = simulate(work, Model::unrelated, unrelated, {64}).front();
     const Trial a = simulate(work, Model::shadowed, shadowed, {64}).front();
     const auto c = simulate(work, Model::heavy, heavy, {2, 64});
-    return {
-        sampled(after("MSE / MSE of the mean, model B (rho 0)", 64), relative_mse(b), predicted(Model::unrelated, 64), 1),
-        sampled(after("the same, model C (rho .15)", 2), relative_mse(c[0]), Relation::below, 1),
-        sampled(after("the same, model C", 64), relative_mse(c[1]), Relation::above, 1),
-        sampled(after("the same, model A (rho .77)", 64), relative_mse(a), predicted(Model::shadowed, 64), 1)};
+    return {sampled(after("MSE / MSE of the mean, B (rho 0)", 64), relative_mse(b), predicted(Model::unrelated, 64), 1),
+            sampled(after("the same, C (rho .15)", 2), relative_mse(c[0]), Relation::below, 1),
+            sampled(after("the same, C", 64), relative_mse(c[1]), Relation::above, 1),
+            sampled(after("the same, A (rho .77)", 64), relative_mse(a), predicted(Model::shadowed, 64), 1)};
 }
 
 std::vector<double> sorted_samples(const Work& work, const ErrorModel& model, std::uint32_t id, std::uint64_t count) {
@@ -101,18 +100,18 @@ Numbers spread(const Work& work) {
     for (const double x : {10.0, 1000.0}) {
         const Average inside = share_between(work, figure(1), tails, -x, x);
         const ErrorLaw law(Law::exact, figure(1));
-        out.push_back(sampled(x == 10 ? "x P(|X| > x), x = 10, s = .35" : "the same, x = 1000; a normal law has 0",
+        out.push_back(sampled(x == 10 ? "x P(|X| > x), x = 10, s = .35" : "the same, x = 1000",
                               {(1 - inside.value) * x, inside.error * x}, (law.cdf(-x) + law.sf(x)) * x, 0));
     }
     out.push_back(computed("2 C, the limit of x P(|X| > x)", 1e6 * 2 * ErrorLaw(Law::exact, figure(1)).sf(1e6), 1e-6,
                            2 * ErrorLaw(Law::exact, figure(1)).tail_constant(), 0));
     const auto variance = median_variance(work, figure(1));
-    out.push_back(sampled("median sample variance, blocks of " + std::to_string(variance.n), variance.seen,
-                          variance.expected, variance.body));
+    out.push_back(sampled("median variance of blocks of " + std::to_string(variance.n), variance.seen, variance.expected,
+                          variance.body));
     const Average wide = quartile_width(work, figure(16), spreads), narrow = quartile_width(work, figure(64), spreads + 1);
     const ErrorLaw law16(Law::exact, figure(16)), law64(Law::exact, figure(64));
     const double value = narrow.value / wide.value;
-    out.push_back(sampled("distance of quartiles, n = 64 over n = 16",
+    out.push_back(sampled("quartiles' distance, n = 64 / n = 16",
                           {value, value * std::hypot(wide.error / wide.value, narrow.error / narrow.value)},
                           (law64.quantile(.75) - law64.quantile(.25)) / (law16.quantile(.75) - law16.quantile(.25)), 1));
     return out;
@@ -145,16 +144,16 @@ Numbers dark_and_bright(const Work& work) {
     const auto first_moment = [&](double x) { return x * published.pdf(x); };
     const double published_mean =
         simpson(first_moment, -far, far, 4000) / simpson([&](double x) { return published.pdf(x); }, -far, far, 4000);
-    Numbers out{computed("mode over c, n = 16, s = .0875; of (22) it is 1", exact.modes().front() / c, 20 * s2, 2, 1),
-                sampled("excess of samples just above 0 over just below", lean(work, model, width),
-                        (right - left) / (right + left), 0)};
+    Numbers out{computed("mode / c, n = 16, s = .0875", exact.modes().front() / c, 8 * s2, 2, 1),
+                sampled("(just above - just below 0) / all", lean(work, model, width), (right - left) / (right + left), 0)};
     const Average below = share_between(work, model, brightness, -far, 0);
     out.push_back(sampled("share below 0", {below.value, .5 / std::sqrt(static_cast<double>(work.samples))}, .5));
-    out.push_back(sampled("mean within 12 sd; -2c by (22)", mean_within(work, model), exact.bias(), published_mean));
+    out.push_back(sampled("mean within 12 sd", mean_within(work, model), exact.bias(), published_mean));
     return out;
 }
 
-// chi-square of counts over its degrees of freedom: 1, with deviation sqrt(2 / dof), where the law is right.
+// chi-square of counts over its degrees of freedom: 1, with deviation sqrt(2 / dof), where the law is right; the non-central
+// chi-square's deviation where it is not.
 Number chi_square_of(const std::string& what, const clratio::Histogram& counts, Law law) {
     std::vector<std::uint64_t> cells{counts.underflow};
     cells.insert(cells.end(), counts.bins.begin(), counts.bins.end());
@@ -162,8 +161,9 @@ Number chi_square_of(const std::string& what, const clratio::Histogram& counts, 
     const auto bins = static_cast<std::uint32_t>(counts.bins.size());
     const auto fit = clratio::chi_square(cells, ErrorLaw(law, figure(1)).bin_probabilities(counts.lo, counts.hi, bins));
     const auto dof = static_cast<double>(fit.dof);
-    const Average of{fit.statistic / dof, std::sqrt(2 / dof)};
-    return law == Law::exact ? sampled(what + ", exact law", of, 1) : sampled(what + ", (22)", of, Relation::above, 2);
+    const double value = fit.statistic / dof;
+    return law == Law::exact ? sampled(what + ", exact law", {value, std::sqrt(2 / dof)}, 1)
+                             : sampled(what + ", (22)", {value, std::sqrt(2 * (2 * value - 1) / dof)}, Relation::above, 2);
 }
 
 void add_fits(Numbers& to, const std::string& name, const clratio::Histogram& counts) {
@@ -195,13 +195,11 @@ Numbers precision(const Work& work) {
     const Ends wide = ends([](std::uint32_t h) { return clratio::device::clr_normal_double(h, h); });
     const ErrorLaw normal(Law::mc, {0, 1, 1, 0});
     const double most = -normal.quantile(0x1p-33), most_wide = -normal.quantile(0x1p-65);
-    Numbers out{
-        computed("words of 2^32 without a normal, literal float", static_cast<double>(literal.not_finite), 0, 193, 0),
-        computed("the same, ours in float and in double", static_cast<double>(ours.not_finite + wide.not_finite), 0, 0),
-        computed("|z| at most, literal; a 32-bit word reaches 6.338", literal.largest, 2e-3, -normal.quantile(0x1p-25),
-                 most),
-        computed("|z| at most, ours in float", ours.largest, 6e-7 * most, most),
-        computed("|z| at most, double", wide.largest, 2e-15 * most_wide, most_wide)};
+    Numbers out{computed("words without a normal, literal", static_cast<double>(literal.not_finite), 0, 193, 0),
+                computed("the same, ours, float and double", static_cast<double>(ours.not_finite + wide.not_finite), 0, 0),
+                computed("|z| at most, literal", literal.largest, 2e-3, -normal.quantile(0x1p-25), most),
+                computed("|z| at most, ours, float", ours.largest, 6e-7 * most, most),
+                computed("|z| at most, ours, double", wide.largest, 2e-15 * most_wide, most_wide)};
     const clratio::Bins bins{-1.5, 1.5, 1024};
     const clratio::Stream stream{1, pipelines};
     const auto drawn = [&](clratio::Precision p) {

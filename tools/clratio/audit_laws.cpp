@@ -18,6 +18,7 @@ using Numbers = std::vector<Number>;
 // s = .35, .25, and .2 with the impulse; then a denominator that is negative one time in six, s = 1.
 constexpr ErrorModel figure{.5, 1, .5, .35}, half{1, 2, .5, .5}, impulse{1, 0, .3, .2}, wild{1, 2, .5, 2};
 constexpr std::array models{figure, half, impulse, wild};
+const std::array<std::string, 4> labels{"s = .35", "s = .25", "tau 0, s = .2", "s = 1"};
 
 constexpr double rounding = 1e-11;  ///< the library's bound for its integrals
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -34,14 +35,14 @@ Number closed_interval() {
     int not_finite = 0;
     for (const double z1 : {-infinity, infinity})
         for (const double z2 : {-infinity, infinity}) not_finite += !std::isfinite(literal_error(figure, z1, z2));
-    return computed("not finite, of the corners xi1, xi2 = 0 or 1", not_finite, 0, 4, 0);
+    return computed("not finite, of the 4 corners of xi", not_finite, 0, 4, 0);
 }
 
 Numbers samples_follow_exact_law(const Work& work) {
     Numbers out;
     for (std::uint32_t k = 0; k < models.size(); ++k)
-        out.push_back(computed("KS of samples and exact law, " + describe(models[k]),
-                               Counts(work, models[k], k).distance(Law::exact), farthest(work.samples), 0));
+        out.push_back(computed("KS to the exact law, " + labels[k], Counts(work, models[k], k).distance(Law::exact),
+                               farthest(work.samples), 0));
     out.push_back(closed_interval());
     return out;
 }
@@ -70,13 +71,13 @@ Conditional below_zero(const Work& work, bool same_sign) {
     const double xi =
         simpson(mapped, edge, far, 4000) / simpson([](double v) { return normal_density(v); }, edge, far, 4000);
     const double p = hits / n;
-    return {{p, std::sqrt(p * (1 - p) / n)}, xi, 1 - xi};
+    return {{p, std::sqrt(xi * (1 - xi) / n)}, xi, 1 - xi};
 }
 
 Numbers mapping(const Work& work) {
     const auto same = below_zero(work, true), opposite = below_zero(work, false);
-    return {sampled("P(X <= 0), s = 1, denominators of tau's sign", same.seen, same.mapped),
-            sampled("the same of the opposite sign; 1 - Xi", opposite.seen, opposite.complement, opposite.mapped)};
+    return {sampled("P(X <= 0), denominators of tau's sign", same.seen, same.mapped),
+            sampled("the same of the opposite sign", opposite.seen, opposite.complement, opposite.mapped)};
 }
 
 // The largest relative distance of two laws over 12 deviations, all models.
@@ -89,12 +90,12 @@ double apart(Law one, Law other) {
     return worst;
 }
 
-// A narrow bin about -mu, where the missing |psi + i| / |tau + i| is far from 1.
+// A bin well above 0, where small denominators count most. (At x = 0 and x = -mu the missing factor is 1 on the average.)
 Number density_of_samples(const Work& work) {
-    const double lo = -figure.mu - 0.05, hi = -figure.mu + 0.05;
+    const double lo = 0.45, hi = 0.55;
     const ErrorLaw exact(Law::exact, figure), published(Law::integral, figure);
-    return sampled("P(-.55 <= X < -.45), " + describe(figure), share_between(work, figure, 10, lo, hi),
-                   exact.cdf(hi) - exact.cdf(lo), simpson([&](double x) { return published.pdf(x); }, lo, hi, 200));
+    return sampled("P(.45 <= X < .55), s = .35", share_between(work, figure, 10, lo, hi), exact.cdf(hi) - exact.cdf(lo),
+                   simpson([&](double x) { return published.pdf(x); }, lo, hi, 200));
 }
 
 Numbers mass_of_17(const ErrorModel& model) {
@@ -102,14 +103,13 @@ Numbers mass_of_17(const ErrorModel& model) {
     const double s = clratio::canonical(model).s, body = 12 * law.scale();
     const double decade = std::log(1e3), growth = mass(law, 1e7) - mass(law, 1e4);
     return {
-        computed("integral of exact law + tails past 12 sd, s = .35", mass(exact, body) + exact.cdf(-body) + exact.sf(body),
-                 1e-9, 1),
+        computed("integral of the exact law, tails added", mass(exact, body) + exact.cdf(-body) + exact.sf(body), 1e-9, 1),
         [&] {
-            Number n = computed("integral of (17) over 12 sd, s = .35", mass(law, body), 1e-9, 1);
+            Number n = computed("integral of (17), +-12 sd, s = .35", mass(law, body), 1e-9, 1);
             n.relation = Relation::above;
             return n;
         }(),
-        computed("what it gains with each factor e of the window", growth / decade, 1e-6, 2 * normal_density(1 / s) / s, 0)};
+        computed("its gain with each factor e of window", growth / decade, 1e-6, 2 * normal_density(1 / s) / s, 0)};
 }
 
 // The integrand of (17), and (18, 19), where it is a normal in psi of centre mu' and deviation sigma'.
@@ -124,14 +124,14 @@ Number rescaled() {
                 const double scaled = scale * normal_density(psi, centre, deviation);
                 worst = std::max(worst, std::abs(direct - scaled) * e.sigma_m);
             }
-    return computed("(17) - (18, 19), of the integrands, over the peak", worst, 1e-13, 0);
+    return computed("integrand of (17) - of (18, 19)", worst, 1e-13, 0);
 }
 
 Numbers singular_point() {
     const double x = -figure.mu;
     const double deviation = figure.sigma_m * std::abs(figure.tau / (x + figure.mu));
     return {computed("1 / sigma' at x = -mu", 1 / deviation, 0, 0),
-            computed("the density (17) there, as (22)", ErrorLaw(Law::integral, figure).pdf(x), 1e-11,
+            computed("the density (17) there", ErrorLaw(Law::integral, figure).pdf(x), 1e-11,
                      normal_density(figure.mu, 0, figure.sigma_m))};
 }
 
@@ -158,8 +158,8 @@ Numbers product_of_normals() {
     const auto& p = same_centre;
     const double literal_constant = 1 / (std::sqrt(2 * std::numbers::pi) * p.st * p.sm);
     const double drop = std::log(p.direct(p.tau + 0.3) / p.direct(p.tau)), literal_drop = -0.3 * 0.3 * p.variance() / 2;
-    return {computed("g g over the corrected product, largest distance", worst, 1e-12, 0),
-            computed("g g over the printed constant, at the centre", p.direct(p.tau) / literal_constant, 1e-14,
+    return {computed("g g / corrected product - 1, at most", worst, 1e-12, 0),
+            computed("g g / printed form, at the centre", p.direct(p.tau) / literal_constant, 1e-14,
                      1 / std::sqrt(2 * std::numbers::pi), 1),
             computed("exponent .3 off the centre", drop, 1e-13, literal_drop / std::pow(p.st * p.sm, 2), literal_drop)};
 }
@@ -174,20 +174,19 @@ Number completed_square() {
             p.variance() * std::pow(psi - p.centre(), 2) + std::pow(p.st * p.sm * (p.tau - p.mu), 2) / p.variance();
         worst = std::max(worst, std::abs(open - square));
     }
-    return computed("completed square - open form, largest", worst, 1e-13, 0);
+    return computed("completed square - open form, at most", worst, 1e-13, 0);
 }
 
 Numbers published_law(const Work& work) {
-    Numbers out{computed("(22) over (17), largest distance, 4 models", apart(Law::published, Law::integral), rounding, 0)};
+    Numbers out{computed("(22) / (17) - 1, at most, 4 models", apart(Law::published, Law::integral), rounding, 0)};
     const ErrorModel tenth{.5, 1, .5, .1};
     const double s = .1, body = 12 * ErrorLaw(Law::exact, tenth).scale();
-    out.push_back(computed("integral of (22) over 12 sd, s = .1; 1 + s^2 + 3 s^4",
-                           mass(ErrorLaw(Law::published, tenth), body), 30 * std::pow(s, 6), 1 + s * s + 3 * std::pow(s, 4),
-                           1));
+    out.push_back(computed("integral of (22), +-12 sd, s = .1", mass(ErrorLaw(Law::published, tenth), body),
+                           30 * std::pow(s, 6), 1 + s * s + 3 * std::pow(s, 4), 1));
     for (const std::uint32_t k : {0u, 1u, 2u}) {
         const Counts counts(work, models[k], 20 + k);
-        out.push_back(computed("KS of samples and (22), " + describe(models[k]), counts.distance(Law::published),
-                               farthest(work.samples), counts.distance(Law::exact, Law::published), 0));
+        out.push_back(computed("KS to (22), " + labels[k], counts.distance(Law::published), farthest(work.samples),
+                               counts.distance(Law::exact, Law::published), 0));
     }
     return out;
 }
@@ -197,10 +196,9 @@ Numbers limit(const Work& work) {
     double worst = 0;
     const ErrorLaw exact(Law::exact, narrow), normal(Law::mc, narrow);
     for (double x = -2; x <= 2; x += 0.05) worst = std::max(worst, std::abs(exact.pdf(x) - normal.pdf(x)));
-    // To first order f / f_mc - 1 = s (x^3 a - ..) / b^2: with a = -s, below 30 s^2 over the whole window.
-    return {computed("exact law - N(0, sigma_m^2), s = 1e-4, largest", worst, 30e-8, 0),
-            computed("KS of samples and N(0, sigma_m^2)", Counts(work, narrow, 30).distance(Law::mc), farthest(work.samples),
-                     0)};
+    // s and a = -mu s are both small, so that the two differ by the order of s^2.
+    return {computed("exact law - N(0, sm^2), s = 1e-4", worst, 30e-8, 0),
+            computed("KS to N(0, sm^2), s = 1e-4", Counts(work, narrow, 30).distance(Law::mc), farthest(work.samples), 0)};
 }
 
 }  // namespace
@@ -222,7 +220,7 @@ std::vector<Finding> law_findings(const Work& work) {
          "f(x) is the integral of g(G^-1(Xi)) g(psi) over psi",
          wrong,
          "The density of x for one psi is dXi/dx: |psi + i| / |tau + i| is missing. With it, the integral is the exact law.",
-         {computed("(16) corrected over the exact law, 4 models", apart(Law::exact_integral, Law::exact), 1e-10, 0),
+         {computed("(16) corrected / exact law - 1, 4 models", apart(Law::exact_integral, Law::exact), 1e-10, 0),
           density_of_samples(work)}},
         {"17", "the same integral, simplified", wrong,
          "Without the factor it is no density: weighted by E[1/|psi + i|] it has an infinite integral, for every "

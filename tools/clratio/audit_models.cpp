@@ -165,7 +165,7 @@ Average Trial::covariance() const {
 
 std::vector<Trial> simulate(const Work& work, Model model, std::uint32_t run, std::vector<std::uint64_t> n,
                             Pairing pairing) {
-    const std::size_t replicas = work.samples / n.back();
+    const std::size_t replicas = std::min(work.samples, most_pairs) / std::max<std::uint64_t>(16, n.back());
     clratio::Moments sum{work.engine, replicas, {.ratios = true}};
     std::vector<Trial> out;
     for (const std::uint64_t until : n) {

@@ -54,7 +54,11 @@ struct Trial {
 
 enum class Pairing { shared, independent };  ///< m and t from the same samples, or from two runs
 
-/// work.samples / n.back() replicas, read out after each of the ascending n. Takes runs `run` and `run + 1`.
+/// Pairs are kept in memory: no more than these, whatever work.samples says.
+constexpr std::uint64_t most_pairs = 10'000'000;
+
+/// work.samples / n.back() replicas (a 16th of them at most), read out after each of the ascending n. Takes runs `run` and
+/// `run + 1`.
 std::vector<Trial> simulate(const Work& work, Model model, std::uint32_t run, std::vector<std::uint64_t> n,
                             Pairing pairing = Pairing::shared);
 

@@ -1,5 +1,6 @@
 // The audit as text of 100 columns, as JSON and as a page of the docs.
 #include <algorithm>
+#include <cmath>
 #include <sstream>
 
 #include "audit.hpp"
@@ -26,18 +27,21 @@ std::vector<std::string> wrap(const std::string& text, std::size_t width) {
     return lines;
 }
 
-// Decimals that show two digits of the error, where that is a readable number.
-int decimals(double error) { return std::clamp(1 - static_cast<int>(std::floor(std::log10(error))), 0, 9); }
+// A bound that shows among the digits of what is expected, not mere rounding.
+bool shows(const Number& n) { return !n.sampled && n.expected != 0 && n.error > 1e-4 * std::abs(n.expected); }
 
+// With decimals that show two digits of the error, where there is one to show.
 std::string plain(const Number& n, double v) {
     if (v == 0) return "0";
-    if (!n.sampled || n.error <= 0 || std::abs(v) >= 1e5) return fmt::format("{:.6g}", v);
-    return fmt::format("{:.{}f}", v, decimals(n.error));
+    if (shows(n) || (n.sampled && n.error > 0))
+        return fmt::format("{:.{}f}", v, std::clamp(1 - static_cast<int>(std::floor(std::log10(n.error))), 0, 9));
+    return fmt::format("{:.{}g}", v, n.sampled ? 3 : 6);
 }
 
 std::string value_of(const Number& n, const char* plus_minus) {
-    return n.sampled && n.error > 0 ? fmt::format("{} {} {:.2g}", plain(n, n.value), plus_minus, n.error)
-                                    : plain(n, n.value);
+    if (n.sampled && n.error > 0) return fmt::format("{} {} {:.2g}", plain(n, n.value), plus_minus, n.error);
+    if (shows(n)) return fmt::format("{} ({:.2g})", plain(n, n.value), n.error);
+    return plain(n, n.value);
 }
 
 std::string expected_of(const Number& n) {
@@ -61,10 +65,10 @@ void paragraph(std::string& out, const char* label, const std::string& text) {
 }
 
 void number_line(std::string& out, const Number& n) {
-    constexpr std::size_t what_width = 45;
+    constexpr std::size_t what_width = 40;
     const auto what = wrap(n.what, what_width);
-    for (std::size_t i = 0; i + 1 < what.size(); ++i) out += fmt::format("      {}\n", what[i]);
-    std::string line = fmt::format("      {:<{}}  {:<18} {:<11} {:<11}", what.back(), what_width, value_of(n, "+-"),
+    for (std::size_t i = 0; i + 1 < what.size(); ++i) out += fmt::format("    {}\n", what[i]);
+    std::string line = fmt::format("    {:<{}}  {:<20} {:<13} {:<13}", what.back(), what_width, value_of(n, "+-"),
                                    expected_of(n), refuted_of(n));
     out += fmt::format("{} {}\n", line, outcome_of(n));
 }
@@ -100,7 +104,7 @@ that do not sum to 1. Each is taken in turn here: what is said (in our words), w
 when the command ran. `clratio audit` repeats it on your device, in under a minute, and exits with 1 if any number is not what it should be.
 
 How to read the tables: *value* has its standard error behind ± where it comes from samples; such a number must be within 5 standard errors of
-what is *expected*. The others are computed within a stated bound. *Not* is the number that the claim as printed would give, and which the value
+what is *expected*. The others are computed within a bound, in brackets where it shows. *Not* is the number that the claim as printed would give, and which the value
 must keep away from by the same distance. The seeds were fixed beforehand. The models of pairs (m, t), with tau = 1 but for C:
 
 - A: t lognormal, .8 in the log; m = V t, visible (V = 1) with probability .2 + .7 t / (1 + t). Correlation .77. A0: the same with .6.

@@ -1,7 +1,5 @@
 #include "audit_samples.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <numeric>
 
@@ -55,10 +53,6 @@ double mass(const ErrorLaw& law, double window) {
     const double far = std::asinh(window / law.scale());
     const auto stretched = [&](double y) { return law.pdf(law.scale() * std::sinh(y)) * law.scale() * std::cosh(y); };
     return simpson(stretched, -far, far, 8000);
-}
-
-std::string describe(const ErrorModel& m) {
-    return fmt::format("mu {}, tau {}, sigmas {}, {}", m.mu, m.tau, m.sigma_m, m.sigma_t);
 }
 
 }  // namespace tool::audit

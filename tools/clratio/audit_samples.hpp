@@ -2,7 +2,6 @@
 #pragma once
 
 #include <span>
-#include <string>
 #include <vector>
 
 #include "audit.hpp"
@@ -40,7 +39,5 @@ Average share_between(const Work& work, const clratio::ErrorModel& model, std::u
 
 /// The integral of a law's density from -window to window, both far beyond the body: 1e-9 relative.
 double mass(const clratio::ErrorLaw& law, double window);
-
-std::string describe(const clratio::ErrorModel& model);
 
 }  // namespace tool::audit
