@@ -22,7 +22,7 @@ Examples:
 The environment variable CLRATIO_DEVICE ("0:0", "cpu", "gpu", or a part of a name) chooses the device.)";
 
 constexpr auto add_commands = {tool::add_devices, tool::add_combine, tool::add_compare, tool::add_picture,
-                               tool::add_law,     tool::add_errors,  tool::add_figures};
+                               tool::add_law,     tool::add_errors,  tool::add_figures, tool::add_audit};
 
 int fail(const std::string& what, int code) {
     fmt::print(stderr, "clratio: {}\n", what);

@@ -1,0 +1,66 @@
+// clratio audit: the supplement's equations and sentences, each with a number computed now.
+#include "audit.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <iterator>
+
+#include "progress_line.hpp"
+#include "tool.hpp"
+
+namespace tool {
+namespace {
+
+struct Options {
+    std::uint64_t samples = 10'000'000;
+    bool quick = false, json = false, markdown = false;
+};
+
+constexpr std::uint64_t quick_samples = 1'000'000;
+
+audit::Report examine(const Options& options) {
+    const audit::Work work{clratio::Engine{}, options.quick ? quick_samples : options.samples};
+    audit::Report report{work.engine.info().name, work.samples};
+    ProgressLine line;
+    const auto start = std::chrono::steady_clock::now();
+    const auto examine_part = [&](const char* name, auto findings) {
+        line.show(fmt::format("audit: {} ...", name));
+        std::ranges::move(findings(work), std::back_inserter(report.findings));
+    };
+    examine_part("equations (1) to (13)", audit::estimator_findings);
+    examine_part("equations (14) to (23)", audit::law_findings);
+    examine_part("the figures", audit::figure_findings);
+    report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return report;
+}
+
+int audit_command(const Options& options) {
+    const audit::Report report = examine(options);
+    fmt::print("{}", options.json       ? audit::json_of(report)
+                     : options.markdown ? audit::markdown_of(report)
+                                        : audit::text_of(report));
+    return audit::all_hold(report) ? ok : failed;
+}
+
+}  // namespace
+
+void add_audit(CLI::App& app, Run& run) {
+    auto options = std::make_shared<Options>();
+    auto* command = app.add_subcommand("audit", "Check equations (1) to (23) of the supplement, with numbers computed now");
+    auto* samples =
+        command->add_option("--samples", options->samples, "Error samples for each number; pairs (m, t) are 10^7 at most")
+            ->capture_default_str()
+            ->check(CLI::Range(quick_samples, std::uint64_t{100'000'000}));
+    command->add_flag("-q,--quick", options->quick, "10^6 samples: a tenth of the work")->excludes(samples);
+    auto* json = command->add_flag("--json", options->json, "Print one JSON array, an object for each number");
+    command->add_flag("--markdown", options->markdown, "Print the page docs/audit.md")->excludes(json);
+    command->footer(
+        "The supplement is 'Ratio Estimator Properties' by Velinov and Mitchell. A sampled number has its standard\n"
+        "error behind +- and must be within 5 of them of what is expected; a computed one has a bound, in brackets where "
+        "it\n"
+        "shows. Exit code 1: a number is not what it should be. The seeds are fixed.\n\n"
+        "Example: clratio audit --quick");
+    command->callback([=, &run] { run = [options] { return audit_command(*options); }; });
+}
+
+}  // namespace tool
