@@ -20,8 +20,8 @@
 
 using namespace clratio;
 using nlohmann::json;
-using support::Said;
-using support::Scratch;
+using clratio::test::Said;
+using clratio::test::Scratch;
 
 namespace {
 
@@ -35,7 +35,7 @@ Words operator+(Words a, const Words& b) {
 const ErrorModel paper{.5, 1, .5, .35};
 const Words model{"errors", "--mu", ".5", "--tau", "1", "--sigma-m", ".5", "--sigma-t", ".35"};
 
-Said run(const Words& words, const support::Surroundings& around = {}) { return support::run(CLRATIO_TOOL, words, around); }
+Said run(const Words& words, const clratio::test::Surroundings& around = {}) { return clratio::test::run(CLRATIO_TOOL, words, around); }
 
 json counted(const Words& words) {
     const Said said = run(model + words + Words{"--json"});
@@ -45,7 +45,7 @@ json counted(const Words& words) {
 }
 
 /// Exit code, one line on stderr with `part` in it, nothing on stdout.
-void expect_refused(const Words& words, int code, const std::string& part, const support::Surroundings& around = {}) {
+void expect_refused(const Words& words, int code, const std::string& part, const clratio::test::Surroundings& around = {}) {
     const Said said = run(words, around);
     EXPECT_EQ(said.code, code) << said.err;
     EXPECT_EQ(said.out, "");
@@ -66,7 +66,7 @@ struct Csv {
     std::vector<std::vector<std::string>> rows;
 
     explicit Csv(const std::string& file) {
-        auto lines = split(support::bytes_of(file), '\n');
+        auto lines = split(clratio::test::bytes_of(file), '\n');
         if (lines.empty()) return;
         header = lines.front();
         for (std::size_t i = 1; i < lines.size(); ++i) rows.push_back(split(lines[i], ','));
@@ -201,10 +201,10 @@ TEST(Errors, parts_add_up_to_the_whole) {
 TEST(Errors, draws_svg_and_png) {
     const Scratch scratch;
     counted({"--n", "1,4,16", "--count", "1e5", "--plot", scratch / "e.svg"});
-    EXPECT_TRUE(is_svg(support::bytes_of(scratch / "e.svg")));
+    EXPECT_TRUE(is_svg(clratio::test::bytes_of(scratch / "e.svg")));
     counted({"--count", "1e5", "--estimator", "mc", "--plot", scratch / "e.png"});
-    EXPECT_TRUE(is_png(support::bytes_of(scratch / "e.png")));
-    EXPECT_FALSE(is_png(support::bytes_of(scratch / "e.svg")));
+    EXPECT_TRUE(is_png(clratio::test::bytes_of(scratch / "e.png")));
+    EXPECT_FALSE(is_png(clratio::test::bytes_of(scratch / "e.svg")));
     EXPECT_EQ(scratch.files(), 2u) << "nothing else is left";
 }
 
@@ -212,14 +212,14 @@ TEST(Errors, no_shell_and_no_script_sees_a_file_name) {
     const Scratch scratch;
     const std::string name = "a';system \"touch hit\";'`touch hit`$(touch hit)\n.svg";
     counted({"--count", "1e5", "--plot", scratch / name});
-    EXPECT_TRUE(is_svg(support::bytes_of(scratch / name)));
+    EXPECT_TRUE(is_svg(clratio::test::bytes_of(scratch / name)));
     EXPECT_EQ(scratch.files(), 1u);
     EXPECT_FALSE(std::filesystem::exists("hit"));
 }
 
 TEST(Errors, without_gnuplot_the_package_is_named_before_the_work) {
     const Scratch scratch;
-    support::Surroundings empty;
+    clratio::test::Surroundings empty;
     empty.environment = {{"PATH", scratch / ""}};
     expect_refused(model + Words{"--count", "1e15", "--plot", scratch / "e.svg"}, 1, "gnuplot-nox", empty);
     expect_refused({"figures", "-o", scratch / "f", "--count", "1e15"}, 1, "gnuplot-nox", empty);
@@ -227,10 +227,10 @@ TEST(Errors, without_gnuplot_the_package_is_named_before_the_work) {
 
 TEST(Errors, a_gnuplot_that_fails_leaves_no_file) {
     const Scratch scratch, bin;
-    support::put_bytes(bin / "gnuplot",
+    clratio::test::put_bytes(bin / "gnuplot",
                        "#!/bin/sh\n[ \"$2\" = --version ] && exit 0\necho 'no such terminal' >&2\nexit 1\n");
     std::filesystem::permissions(bin / "gnuplot", std::filesystem::perms::owner_all);
-    support::Surroundings broken;
+    clratio::test::Surroundings broken;
     broken.environment = {{"PATH", bin / ""}};
     expect_refused(model + Words{"--count", "1e5", "--plot", scratch / "e.svg"}, 1, "gnuplot: no such terminal", broken);
     EXPECT_EQ(scratch.files(), 0u);
@@ -262,7 +262,7 @@ TEST(Errors, bad_arguments_are_usage_errors) {
 
 TEST(Errors, a_full_disk_is_said_and_leaves_no_file) {
     const Scratch scratch;
-    support::Surroundings small;
+    clratio::test::Surroundings small;
     small.file_size_limit = 4096;
     expect_refused(model + Words{"--count", "1e5", "--csv", scratch / "h.csv"}, 1, "h.csv: cannot be written", small);
     EXPECT_EQ(scratch.files(), 0u);
@@ -306,9 +306,9 @@ TEST(Figures, files_and_numbers) {
     EXPECT_EQ(said.err, "");
     for (const char* figure : {"figure1", "figure2"}) {
         const std::string stem = scratch / ("new/folder/" + std::string(figure));
-        EXPECT_TRUE(is_svg(support::bytes_of(stem + ".svg")));
-        EXPECT_TRUE(is_png(support::bytes_of(stem + ".png")));
-        EXPECT_NE(support::bytes_of(stem + ".svg").find("published eq. (22)"), std::string::npos);
+        EXPECT_TRUE(is_svg(clratio::test::bytes_of(stem + ".svg")));
+        EXPECT_TRUE(is_png(clratio::test::bytes_of(stem + ".png")));
+        EXPECT_NE(clratio::test::bytes_of(stem + ".svg").find("published eq. (22)"), std::string::npos);
     }
     const Csv samples(scratch / "new/folder/figure2.csv");
     EXPECT_EQ(samples.rows.size(), 14 * 303u);
@@ -316,7 +316,7 @@ TEST(Figures, files_and_numbers) {
     EXPECT_EQ(std::accumulate(counts.begin(), counts.end(), std::uint64_t{0}), 1'400'000u);
 
     // The peaks of theory, to three decimals; between two of 901 points a peak loses peak * N (step / 2)^2 / (2 * .28).
-    const auto rows = split(support::bytes_of(scratch / "new/folder/figure1.csv"), '\n');
+    const auto rows = split(clratio::test::bytes_of(scratch / "new/folder/figure1.csv"), '\n');
     EXPECT_EQ(rows.front(), "estimator,n,error,exact,published");
     std::map<std::string, double> peak, difference;
     for (std::size_t i = 1; i < rows.size(); ++i) {
