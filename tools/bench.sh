@@ -48,7 +48,8 @@ prepare() {
     mkdir -p "$results"
 }
 
-# An untimed pass at small sizes fills the caches of built programs. Repetitions of all cases of a benchmark come in a random order, so that what else the machine does falls on all of them.
+# An untimed pass at small sizes fills the caches of built programs. Repetitions of all cases of a benchmark come in a random order,
+# so that what else the machine does falls on all of them.
 benchmarks() {
     local bench word
     for bench in "$build"/*_bench; do

