@@ -10,7 +10,7 @@ build_packages=(
 )
 # To build and run the tests, and to check the code.
 # shellcheck disable=SC2034
-test_packages=(libgtest-dev clang-format-14 oclgrind git)
+test_packages=(libgtest-dev clang-format-14 oclgrind git gnuplot-nox)
 # To build the benchmarks.
 # shellcheck disable=SC2034
 bench_packages=(libbenchmark-dev librandom123-dev)

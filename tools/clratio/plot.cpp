@@ -87,7 +87,7 @@ set tics nomirror out scale 0.6 textcolor rgb '#303030'
 set mxtics 2
 set grid xtics ytics linetype 1 linewidth 0.5 linecolor rgb '#ececec'
 set xzeroaxis linetype 1 linewidth 0.7 linecolor rgb '#c8c8c8'
-set key top right Left reverse samplen 1.8 spacing 1.25 width -1 noautotitle textcolor rgb '#303030'
+set key top right Left reverse samplen 1.8 spacing 1.1 width -1 noautotitle textcolor rgb '#303030'
 set xlabel 'probability density' textcolor rgb '#303030'
 set ylabel 'error' textcolor rgb '#303030'
 )";
