@@ -111,6 +111,16 @@ TEST(Audit, Holds) {
     EXPECT_FALSE(holds(computed("no refuted value", 1, 0.1, 1, nan)));
 }
 
+// docs/audit.md was printed by the command as it is now: the same claimsword for word.
+TEST(Audit, ThePageIsUpToDate) {
+    const std::string page = clratio::test::bytes_of(CLRATIO_SOURCE "/docs/audit.md");
+    for (const auto& row : rows())
+        for (const char* key : {"said", "truth"})
+            EXPECT_NE(page.find(row[key].get<std::string>()), std::string::npos)
+                << row[key] << ": run clratio audit --markdown";
+    EXPECT_EQ(page.find("FAILS"), std::string::npos);
+}
+
 TEST(Audit, TextFitsItsColumns) {
     const auto said = clratio::test::run(CLRATIO_TOOL, {"audit", "--quick"});
     EXPECT_EQ(said.code, 0);
