@@ -21,17 +21,6 @@ namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-// Run once for all tests.
-const clratio::test::Said& quick() {
-    static const auto said = clratio::test::run(CLRATIO_TOOL, {"audit", "--quick", "--json"});
-    return said;
-}
-
-const json& rows() {
-    static const json parsed = json::parse(quick().out, nullptr, false);
-    return parsed;
-}
-
 Number number_of(const json& row) {
     const std::string relation = row["relation"];
     Number n{row["number"], row["value"], row["error"], row["error_kind"] == "standard error", row["expected"]};
@@ -40,18 +29,15 @@ Number number_of(const json& row) {
     return n;
 }
 
-TEST(Audit, EveryNumberIsAsExpected) {
-    ASSERT_EQ(quick().code, 0) << quick().err << quick().out;
-    EXPECT_EQ(quick().err, "");
-    ASSERT_TRUE(rows().is_array());
-    for (const auto& row : rows()) EXPECT_TRUE(row["ok"].get<bool>()) << row.dump(2);
+void every_number_is_as_expected(const json& rows) {
+    for (const auto& row : rows) EXPECT_TRUE(row["ok"].get<bool>()) << row.dump(2);
 }
 
-TEST(Audit, NoEquationIsMissing) {
+void no_equation_is_missing(const json& rows) {
     std::set<int> missing;
     for (int k = 1; k <= 23; ++k) missing.insert(k);
     int sentences = 0;
-    for (const auto& row : rows()) {
+    for (const auto& row : rows) {
         const std::string equation = row["equation"];
         sentences += equation == "text";
         std::istringstream parts(equation);
@@ -64,8 +50,8 @@ TEST(Audit, NoEquationIsMissing) {
 }
 
 // The planted fault: each number expected elsewhere, by twice its room and a little for those that have none.
-TEST(Audit, AnExpectationThatIsOffIsSeen) {
-    for (const auto& row : rows()) {
+void an_expectation_that_is_off_is_seen(const json& rows) {
+    for (const auto& row : rows) {
         const Number n = number_of(row);
         ASSERT_TRUE(holds(n)) << row.dump(2);
         const double room = 2 * tool::audit::tolerance(n) + 1e-9 * std::max(1.0, std::abs(n.value));
@@ -79,9 +65,9 @@ TEST(Audit, AnExpectationThatIsOffIsSeen) {
 }
 
 // What the supplement's words give is kept away from, wherever the audit names it, by enough to notice with 10^6 samples.
-TEST(Audit, WhatIsRefutedIsFarAway) {
+void what_is_refuted_is_far_away(const json& rows) {
     std::size_t refuted = 0;
-    for (const auto& row : rows()) {
+    for (const auto& row : rows) {
         Number n = number_of(row);
         if (!n.refuted) continue;
         ++refuted;
@@ -109,6 +95,29 @@ TEST(Audit, Holds) {
         EXPECT_FALSE(holds(none));
     }
     EXPECT_FALSE(holds(computed("no refuted value", 1, 0.1, 1, nan)));
+}
+
+// docs/audit.md was printed by the command as it is now: the same claimsword for word.
+void the_page_is_up_to_date(const json& rows) {
+    const std::string page = clratio::test::bytes_of(CLRATIO_SOURCE "/docs/audit.md");
+    for (const auto& row : rows)
+        for (const char* key : {"said", "truth"})
+            EXPECT_NE(page.find(row[key].get<std::string>()), std::string::npos)
+                << row[key] << ": run clratio audit --markdown";
+    EXPECT_EQ(page.find("FAILS"), std::string::npos);
+}
+
+TEST(Audit, Quick) {
+    const auto said = clratio::test::run(CLRATIO_TOOL, {"audit", "--quick", "--json"});
+    ASSERT_EQ(said.code, 0) << said.err << said.out;
+    EXPECT_EQ(said.err, "");
+    const json rows = json::parse(said.out, nullptr, false);
+    ASSERT_TRUE(rows.is_array());
+    every_number_is_as_expected(rows);
+    no_equation_is_missing(rows);
+    an_expectation_that_is_off_is_seen(rows);
+    what_is_refuted_is_far_away(rows);
+    the_page_is_up_to_date(rows);
 }
 
 TEST(Audit, TextFitsItsColumns) {

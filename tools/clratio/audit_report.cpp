@@ -104,8 +104,8 @@ that do not sum to 1. Each is taken in turn here: what is said (in our words), w
 when the command ran. `clratio audit` repeats it on your device, in under a minute, and exits with 1 if any number is not what it should be.
 
 How to read the tables: *value* has its standard error behind ± where it comes from samples; such a number must be within 5 standard errors of
-what is *expected*. The others are computed within a bound, in brackets where it shows. *Not* is the number that the claim as printed would give, and which the value
-must keep away from by the same distance. The seeds were fixed beforehand. The models of pairs (m, t), with tau = 1 but for C:
+what is *expected*. The others are computed within a bound, in brackets where it shows. *Not* is what the claim as printed would give: the value
+must be further from it than that. The seeds were fixed beforehand. The models of pairs (m, t), with tau = 1 but for C:
 
 - A: t lognormal, .8 in the log; m = V t, visible (V = 1) with probability .2 + .7 t / (1 + t). Correlation .77. A0: the same with .6.
 - B: m and t lognormal, .6 in the log, independent.
