@@ -20,9 +20,9 @@
 #include "support/scratch.hpp"
 
 using namespace clratio;
-using nlohmann::json;
 using clratio::test::Said;
 using clratio::test::Scratch;
+using nlohmann::json;
 
 namespace {
 
@@ -36,7 +36,9 @@ Words operator+(Words a, const Words& b) {
 const ErrorModel paper{.5, 1, .5, .35};
 const Words model{"errors", "--mu", ".5", "--tau", "1", "--sigma-m", ".5", "--sigma-t", ".35"};
 
-Said run(const Words& words, const clratio::test::Surroundings& around = {}) { return clratio::test::run(CLRATIO_TOOL, words, around); }
+Said run(const Words& words, const clratio::test::Surroundings& around = {}) {
+    return clratio::test::run(CLRATIO_TOOL, words, around);
+}
 
 json counted(const Words& words) {
     const Said said = run(model + words + Words{"--json"});
@@ -229,7 +231,7 @@ TEST(Errors, without_gnuplot_the_package_is_named_before_the_work) {
 TEST(Errors, a_gnuplot_that_fails_leaves_no_file) {
     const Scratch scratch, bin;
     clratio::test::put_bytes(bin / "gnuplot",
-                       "#!/bin/sh\n[ \"$2\" = --version ] && exit 0\necho 'no such terminal' >&2\nexit 1\n");
+                             "#!/bin/sh\n[ \"$2\" = --version ] && exit 0\necho 'no such terminal' >&2\nexit 1\n");
     std::filesystem::permissions(bin / "gnuplot", std::filesystem::perms::owner_all);
     clratio::test::Surroundings broken;
     broken.environment = {{"PATH", bin / ""}};

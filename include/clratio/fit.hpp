@@ -40,9 +40,9 @@ Fit kolmogorov_smirnov(std::span<const std::uint64_t> counts, std::span<const do
 /// for.
 std::vector<std::uint64_t> cells(const Histogram& histogram);
 
-/// The tests above for a histogram, against law.bin_probabilities(lo, hi, bins). The edges of single-precision bins lie up to
-/// 2^-22 (hi - lo) beside those; in 1024 bins, 10^10 samples do not show it (docs/errors.md). NaN are in no cell and have no
-/// probability: where there are any, the statistic is infinite and p = 0. Errors as above.
+/// The tests above for a histogram, against law.bin_probabilities(lo, hi, bins). The edges of single-precision bins lie up
+/// to 2^-22 (hi - lo) beside those; in 1024 bins, 10^10 samples do not show it (docs/errors.md). NaN are in no cell and have
+/// no probability: where there are any, the statistic is infinite and p = 0. Errors as above.
 Fit chi_square(const Histogram& histogram, const ErrorLaw& law, double least_expected = 25);
 Fit kolmogorov_smirnov(const Histogram& histogram, const ErrorLaw& law);
 

@@ -42,7 +42,8 @@ void print_flags(const Options& options, const Report& r) {
     line(r.flags.zero_tau, "tau is 0: the impulse guard gave the value");
     line(r.flags.skipped, "a batch was not finite and left out");
     line(r.flags.no_data, "no finite batch: the value is 0");
-    line(options.standard_error.empty() ? 0 : r.flags.no_error_bar, "no error bar: fewer than two batches, or a constant by the zero policy");
+    line(options.standard_error.empty() ? 0 : r.flags.no_error_bar,
+         "no error bar: fewer than two batches, or a constant by the zero policy");
     line(r.flags.nonfinite, "the estimate is not finite");
     line(r.negatives, "negative inputs (counted only)");
 }
