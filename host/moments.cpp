@@ -230,6 +230,14 @@ cl_event Moments::merge(const Moments& other, std::span<const cl_event> wait_lis
 
 void Moments::merge(const Moments& other) { wait(Event(merge(other, {}))); }
 
+void Moments::clear() {
+    auto& s = *state_;
+    wait(s.last);
+    s.add_rows.write(std::vector<std::byte>(s.add_rows.size()));
+    s.batches = 0;
+    s.weight = {0, 0};
+}
+
 std::uint64_t Moments::size() const { return state_->values; }
 std::uint64_t Moments::batches() const { return state_->batches; }
 double Moments::weight() const { return static_cast<double>(state_->weight.hi) + static_cast<double>(state_->weight.lo); }

@@ -104,6 +104,23 @@ TEST(Moments, batches_of_one_launch_and_of_many_have_the_same_bits) {
     EXPECT_NE(all_bits(swapped), all_bits(apart)) << "planted fault: m and t swapped";
 }
 
+TEST(Moments, cleared_is_as_new) {
+    Input in = make_input(4, 9);
+    in.m[0][1] = -1;
+    in.t[0][2] = not_a_number;
+    const Engine engine;
+    Moments used(engine, values, {.ratios = true}), fresh(engine, values, {.ratios = true});
+    used.add(batches_of(in));
+    used.clear();
+    EXPECT_EQ(used.batches() + used.negatives() + used.skipped(), 0u);
+    EXPECT_EQ(used.weight(), 0);
+    const Input other = make_input(5, 3);
+    used.add(batches_of(other));
+    fresh.add(batches_of(other));
+    EXPECT_EQ(all_bits(used), all_bits(fresh));
+    EXPECT_EQ(used.weight(), fresh.weight());
+}
+
 TEST(Moments, the_policies_agree_on_finite_input) {
     const Input in = make_input(3, 5);
     const Engine engine;

@@ -73,6 +73,9 @@ public:
     void merge(const Moments& other);
     cl_event merge(const Moments& other, std::span<const cl_event> wait_list);
 
+    /// Forgets all batches and counts; the memory stays. Blocking.
+    void clear();
+
     std::uint64_t size() const;     ///< values
     std::uint64_t batches() const;  ///< added so far, skipped ones included
     double weight() const;          ///< their sum

@@ -82,10 +82,13 @@ ReadOut Bands::read_out(const Tau& tau, const Wanted& wanted) const {
 }
 
 ReadOut Bands::at_once(std::span<const HostBatch> batches, const Tau& tau, const Wanted& wanted) const {
+    Moments moments = make(0);
     const auto read_band = [&](std::uint64_t band, const Tau& part) {
-        Moments moments = make(band);
-        auto combined = clratio::add_and_combine(moments, slices(band, batches), part, wanted.options);
-        return std::pair{std::move(moments), std::move(combined)};
+        if (moments.size() == size(band))
+            moments.clear();
+        else
+            moments = make(band);
+        return std::pair{moments, clratio::add_and_combine(moments, slices(band, batches), part, wanted.options)};
     };
     return read(read_band, tau, wanted);
 }
