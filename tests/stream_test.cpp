@@ -272,17 +272,33 @@ TEST(Stream, double_normals_are_within_2e_15) {
     EXPECT_LE(worst, 2e-15);
 }
 
-TEST(Stream, double_quantile_is_the_vectors_erfcinv) {
-    for (const auto& v : theory("erfcinv")) {
-        const double q = v["q"], k = q / 2 * 0x1p65;
-        if (q >= 0.5 || k < 1) continue;
-        const auto h = static_cast<std::uint64_t>((k - 1) / 2);
-        if (2 * static_cast<double>(h) + 1 != k) continue;  // only tail probabilities that a word pair can hold
-        const double want = 1.4142135623730951 * v["erfcinv"].get<double>();
-        EXPECT_NEAR(device::clr_normal_double(static_cast<std::uint32_t>(h), static_cast<std::uint32_t>(h >> 32)), -want,
-                    2e-15 * want)
-            << v;
+namespace {
+
+/// erfcinv(2 p) = erfinv(2 q) for p + q = 1/2.
+double inverse_error_function(double p, double q) {
+    const auto z = device::clr_normal_magnitude_double(p, q);
+    return 0.70710678118654752 * (z.n / z.d);
+}
+
+}  // namespace
+
+// 2e-15 is the quantile's bound; one rounding more for the product.
+TEST(Stream, double_quantile_is_the_vectors_erfinv_and_erfcinv) {
+    constexpr double bound = 2e-15 + 0x1p-53;
+    double worst = 0;
+    for (const auto& v : theory("erfinv")) {
+        const double y = std::fabs(v.at("y").get<double>()), want = std::fabs(v.at("erfinv").get<double>());
+        if (want == 0) continue;
+        worst = std::max(worst, std::fabs(inverse_error_function((1 - y) / 2, y / 2) / want - 1));
     }
+    for (const auto& v : theory("erfcinv")) {
+        const double q = v.at("q"), lower = std::min(q, 2 - q), want = std::fabs(v.at("erfcinv").get<double>());
+        if (want == 0) continue;
+        worst = std::max(worst, std::fabs(inverse_error_function(lower / 2, (1 - lower) / 2) / want - 1));
+    }
+    EXPECT_LE(worst, bound);
+    EXPECT_GT(std::fabs(inverse_error_function(0.25, 0.25 * (1 + 0x1p-48)) / inverse_error_function(0.25, 0.25) - 1), bound)
+        << "planted fault: q off by 16 ulp";
 }
 
 TEST(Stream, normals_have_the_same_bits_in_every_shape_and_range) {
