@@ -7,6 +7,7 @@
 
 #include "moments_state.hpp"
 #include "support/oclgrind.hpp"
+#include "support/refused.hpp"
 #include "support/samples.hpp"
 #include "support/shapes.hpp"
 #include "support/theory.hpp"
@@ -356,14 +357,6 @@ TEST(Combine, misuse_is_refused_by_name) {
     const Buffer mem(engine, 100 * sizeof(float));
     const View all{mem.mem(), 0, 100}, shorter{mem.mem(), 0, 99}, past{mem.mem(), 1, 100}, shifted{mem.mem(), 1, 50},
         half{mem.mem(), 0, 50};
-    const auto refused = [](auto&& call, const std::string& what) {
-        try {
-            call();
-            ADD_FAILURE() << "accepted: " << what;
-        } catch (const InvalidArgument& e) {
-            EXPECT_NE(std::string(e.what()).find(what), std::string::npos) << e.what();
-        }
-    };
     refused([&] { combine(engine, all, shorter, all, {all, {}, nullptr}); }, "t: expected 100 values, got 99");
     refused([&] { combine(engine, all, all, shorter, {all, {}, nullptr}); }, "tau: expected 100 values, got 99");
     refused([&] { combine(engine, past, past, past, {past, {}, nullptr}); }, "inside its buffer of 100 elements");

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "launch.hpp"
+#include "support/refused.hpp"
 #include "support/samples.hpp"
 #include "support/shapes.hpp"
 #include "support/twin.hpp"
@@ -201,14 +202,6 @@ TEST(Moments, misuse_is_refused_by_name) {
     const Engine engine, another;
     const std::vector<float> good(values, 1.0f), shorter(values - 1, 1.0f);
     Moments s(engine, values);
-    const auto refused = [](auto&& call, const std::string& what) {
-        try {
-            call();
-            ADD_FAILURE() << "accepted: " << what;
-        } catch (const InvalidArgument& e) {
-            EXPECT_NE(std::string(e.what()).find(what), std::string::npos) << e.what();
-        }
-    };
     refused([&] { Moments(engine, 0); }, "values");
     refused([&] { s.add(good, shorter); }, "t: expected 5003 values, got 5002");
     refused([&] { s.add(shorter, good); }, "m: expected 5003 values, got 5002");
