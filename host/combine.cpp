@@ -13,12 +13,28 @@ std::uint32_t zero_policy(Zero z) {
     return z == Zero::mc_mean ? CLR_ZERO_MC_MEAN : z == Zero::zero ? CLR_ZERO_ZERO : CLR_ZERO_ONE;
 }
 
-std::uint32_t estimator_code(Estimator e) {
-    if (e == Estimator::mean) return CLR_ESTIMATOR_MEAN;
-    return e == Estimator::ratio ? CLR_ESTIMATOR_RATIO : CLR_ESTIMATOR_MEAN_OF_RATIOS;
+View words_view(cl_mem words, std::uint64_t count) { return {words, 0, count}; }
+
+bool wants_interval(const CombineOutput& out) { return out.lower.mem || out.upper.mem || out.kind; }
+bool wants_more(const CombineOutput& out) { return wants_interval(out) || out.bias.mem || out.gain.mem || out.needed.mem; }
+
+bool regresses(Estimator e) { return e == Estimator::regression || e == Estimator::crossfit_regression; }
+
+/// The interval's quantile for a value of so many batches.
+double quantile_for(const CombineOptions& options, std::uint64_t batches) {
+    const std::uint64_t lost = regresses(options.estimator) ? 2 : 1;
+    return student_quantile(options.level, static_cast<double>(batches > lost ? batches - lost : 1));
 }
 
-View flags_view(const CombineOutput& out, std::uint64_t count) { return {out.flags, 0, count}; }
+constexpr std::uint64_t longest_table = 1024;
+
+/// For states whose values may differ in their number of batches.
+Buffer quantile_table(const Moments::State& s, const CombineOptions& options) {
+    std::vector<float> table;
+    for (std::uint64_t k = 0; k <= std::min(s.batches(), longest_table); ++k)
+        table.push_back(static_cast<float>(quantile_for(options, k)));
+    return Buffer::copy_of(s.engine, std::as_bytes(std::span(table)));
+}
 
 /// tau on the device, as long as the call needs it.
 struct DeviceTau {
@@ -47,110 +63,175 @@ DeviceTau put(const Engine& engine, const Tau& tau, std::uint64_t count) {
 class HostOutput {
 public:
     HostOutput(const Engine& engine, std::uint64_t count, const CombineOptions& options)
-        : rows_(Buffer::zeroed(engine, most_work_items(engine) * CLR_TALLY_FLAGS * sizeof(std::uint64_t))) {
-        result_.estimate.resize(count);
-        result_.flag_image.resize(count);
-        if (options.standard_error) result_.standard_error.resize(count);
-        estimate_ = Buffer::onto_host(engine, std::as_writable_bytes(std::span(result_.estimate)));
-        flags_ = Buffer::onto_host(engine, std::as_writable_bytes(std::span(result_.flag_image)));
-        error_ = Buffer::onto_host(engine, std::as_writable_bytes(std::span(result_.standard_error)));
+        : engine_(engine), count_(count),
+          rows_(Buffer::zeroed(engine, most_work_items(engine) * CLR_TALLY_FLAGS * sizeof(std::uint64_t))) {
+        const auto view = [&](std::vector<float>& values, bool wanted) {
+            return View{wanted ? place(values) : nullptr, 0, count};
+        };
+        out_.estimate = view(result_.estimate, true);
+        out_.flags = place(result_.flag_image);
+        out_.standard_error = view(result_.standard_error, options.standard_error);
+        out_.bias = view(result_.bias, options.bias);
+        out_.lower = view(result_.lower, options.interval);
+        out_.upper = view(result_.upper, options.interval);
+        if (options.interval) out_.kind = place(result_.kind);
+        out_.gain = view(result_.gain, options.gain);
+        out_.needed = view(result_.needed, options.needed);
     }
 
-    Reading reading(const View& tau, const CombineOptions& options) const {
-        const std::uint64_t n = result_.estimate.size();
-        Reading r{tau, {{estimate_.mem(), 0, n}, {}, flags_.mem()}, options, rows_.mem()};
-        if (options.standard_error) r.out.standard_error = {error_.mem(), 0, n};
-        return r;
-    }
+    const CombineOutput& output() const { return out_; }
+    Reading reading(const View& tau, const CombineOptions& options) const { return {tau, out_, options, rows_.mem()}; }
+    cl_mem rows() const { return rows_.mem(); }
 
     Combined take() {
-        estimate_.publish();
-        flags_.publish();
-        error_.publish();
+        for (const Buffer& b : buffers_) b.publish();
         std::vector<std::uint64_t> rows(rows_.size() / sizeof(std::uint64_t));
         rows_.read(std::as_writable_bytes(std::span(rows)));
         std::array<std::uint64_t, CLR_TALLY_FLAGS> sum{};
         for (std::size_t i = 0; i < rows.size(); ++i) sum[i % sum.size()] += rows[i];
-        result_.flags = {sum[0], sum[1], sum[2], sum[3], sum[4], sum[5], sum[6]};
+        result_.flags = {sum[0], sum[1], sum[2], sum[3], sum[4], sum[5], sum[6], sum[7], sum[8]};
         return std::move(result_);
     }
 
 private:
+    template <class T> cl_mem place(std::vector<T>& values) {
+        values.resize(count_);
+        buffers_.push_back(Buffer::onto_host(engine_, std::as_writable_bytes(std::span(values))));
+        return buffers_.back().mem();
+    }
+
+    Engine engine_;
+    std::uint64_t count_;
     Combined result_;
-    Buffer estimate_, flags_, error_, rows_;
+    CombineOutput out_;
+    std::vector<Buffer> buffers_;
+    Buffer rows_;
 };
 
-Event read_moments(const Moments& moments, const Reading& reading, std::span<const cl_event> waits) {
+std::string program_options(const Reading& reading) {
+    if (wants_more(reading.out)) return "";
+    return "-DCLR_ESTIMATOR=" + std::to_string(static_cast<std::uint32_t>(reading.options.estimator)) + "u";
+}
+
+Event read_moments(const Moments& moments, Reading reading, std::span<const cl_event> waits) {
     auto& s = moments.state();
-    Launch launch(s.engine, "combine", "clr_combine_moments");
-    reading.give(s.give_planes(launch));
-    s.last = launch.after(waits).after(std::array{s.last.get()}).run_ranges(s.values);
+    if (wants_interval(reading.out) && s.options.nonfinite == NonFinite::skip)
+        reading.quantiles = quantile_table(s, reading.options);
+    Launch launch(s.engine, "combine", "clr_combine_moments", program_options(reading));
+    s.give_planes(launch).arg(s.all_groups());
+    s.last = reading.give(launch, s, s.batches()).after(waits).after(std::array{s.last.get()}).run_ranges(s.values);
     return s.last;
 }
 
-Event read_means(const Engine& engine, const View& m, const View& t, const Reading& reading,
-                 std::span<const cl_event> waits) {
+Event read_means(const Engine& engine, const View& m, const View& t, const View& tau, const CombineOutput& out,
+                 cl_mem flag_rows, Zero zero, std::span<const cl_event> waits) {
     Launch launch(engine, "combine", "clr_combine");
-    return reading.give(launch.view(m).view(t)).after(waits).run_ranges(m.count);
+    launch.view(m).view(t).view(tau).view(out.estimate).arg(out.flags).arg(flag_rows).arg(zero_policy(zero));
+    return launch.after(waits).run_ranges(m.count);
+}
+
+/// Whether the pass that adds can read out as well.
+bool fuses(const Moments::State& s, const Reading& reading) {
+    return s.groups.size() == 1 && !wants_more(reading.out) &&
+           static_cast<std::uint32_t>(reading.options.estimator) <= CLR_ESTIMATOR_MEAN_OF_RATIOS;
 }
 
 void check_stateless(const CombineOptions& options) {
     if (options.estimator != Estimator::ratio)
         throw InvalidArgument("estimator", "ratio, for means without a history", "another; add the batches to Moments");
-    if (options.standard_error)
-        throw InvalidArgument("standard_error", "false, for means without a history", "true; add the batches to Moments");
+    if (options.standard_error || options.bias || options.interval || options.gain || options.needed)
+        throw InvalidArgument("standard_error", "only the estimate, for means without a history",
+                              "more; add the batches to Moments");
+}
+
+void check_outputs(const CombineOutput& out) {
+    if (out.standard_error.mem || wants_more(out))
+        throw InvalidArgument("out", "only estimate and flags, for means without a history", "more");
 }
 
 }  // namespace
 
 void check_estimator(const CombineOptions& options, const MomentsOptions& state) {
-    if (options.estimator != Estimator::mean_of_ratios) return;
-    if (!state.ratios)
+    const Needs needs = needs_of(options.estimator);
+    const auto refuse = [&](const char* how) {
         throw InvalidArgument("estimator", "one whose planes the state has",
-                              "mean_of_ratios: make the Moments with .ratios = true");
-    if (options.standard_error)
-        throw InvalidArgument("standard_error", "an estimator that has one: ratio or mean", "mean_of_ratios");
+                              name_of(options.estimator) + ": make the Moments with " + how);
+    };
+    if (needs.ratios && !state.ratios) refuse(".ratios = true");
+    if (needs.groups && state.groups < 2) refuse(".groups of 2 to 16");
+    if (options.standard_error && options.estimator == Estimator::mean_of_ratios)
+        throw InvalidArgument("standard_error", "an estimator that has one", "mean-of-ratios, which has none");
+    if (!(options.level > 0 && options.level < 1))
+        throw InvalidArgument("level", "a number in (0, 1)", std::to_string(options.level));
+    if (!(options.target >= 0) || !(options.relative_target >= 0))
+        throw InvalidArgument("target", "a finite number of at least 0",
+                              std::to_string(options.target) + " and relative " + std::to_string(options.relative_target));
 }
 
 void Reading::check(std::uint64_t count) const {
     check_view("tau", tau, count);
+    std::vector<std::pair<const char*, View>> outputs;
     const auto output = [&](const char* name, const View& v) {
         if (!v.mem) return;
         check_view(name, v, count);
         if (v.stride < v.channels)
             throw InvalidArgument(name, "a stride of at least its channels", std::to_string(v.stride));
         check_overlap(name, v, "tau", tau);
+        for (const auto& [other_name, other] : outputs) check_overlap(name, v, other_name, other);
+        outputs.emplace_back(name, v);
     };
     output("estimate", out.estimate);
     output("standard_error", out.standard_error);
-    output("flags", flags_view(out, count));
-    if (out.estimate.mem && out.standard_error.mem)
-        check_overlap("standard_error", out.standard_error, "estimate", out.estimate);
+    output("bias", out.bias);
+    output("lower", out.lower);
+    output("upper", out.upper);
+    output("kind", words_view(out.kind, count));
+    output("gain", out.gain);
+    output("needed", out.needed);
+    output("flags", words_view(out.flags, count));
 }
 
-Launch& Reading::give(Launch& launch) const {
-    const std::uint32_t outputs = (out.estimate.mem ? CLR_WRITE_ESTIMATE : 0u) |
-                                  (out.standard_error.mem ? CLR_WRITE_ERROR : 0u) | (out.flags ? CLR_WRITE_FLAGS : 0u);
-    const device::clr_reading r{layout(tau),
-                                layout(out.estimate),
-                                layout(out.standard_error),
-                                estimator_code(options.estimator),
-                                zero_policy(options.zero),
-                                outputs,
-                                0};
-    return launch.arg(tau.mem).arg(out.estimate.mem).arg(out.standard_error.mem).arg(out.flags).arg(flag_rows).arg(r);
+Launch& Reading::give(Launch& launch, const Moments::State& state, std::uint64_t added) const {
+    const auto write = [](bool wanted, std::uint32_t bit) { return wanted ? bit : 0u; };
+    device::clr_reading r{};
+    r.tau = layout(tau);
+    r.estimate = layout(out.estimate);
+    r.error = layout(out.standard_error);
+    r.bias = layout(out.bias);
+    r.lower = layout(out.lower);
+    r.upper = layout(out.upper);
+    r.gain = layout(out.gain);
+    r.needed = layout(out.needed);
+    r.ask.estimator = static_cast<std::uint32_t>(options.estimator);
+    r.ask.zero_policy = zero_policy(options.zero);
+    r.ask.interval = static_cast<std::uint32_t>(options.method);
+    r.ask.outputs = write(out.estimate.mem, CLR_WRITE_ESTIMATE) | write(out.standard_error.mem, CLR_WRITE_ERROR) |
+                    write(out.flags, CLR_WRITE_FLAGS) | write(out.bias.mem, CLR_WRITE_BIAS) |
+                    write(out.lower.mem, CLR_WRITE_LOWER) | write(out.upper.mem, CLR_WRITE_UPPER) |
+                    write(out.kind, CLR_WRITE_KIND) | write(out.gain.mem, CLR_WRITE_GAIN) |
+                    write(out.needed.mem, CLR_WRITE_NEEDED);
+    r.ask.target = options.target;
+    r.ask.relative_target = options.relative_target;
+    r.ask.reliability = state.options.weights == Weights::reliability ? 1 : 0;
+    r.added = static_cast<std::uint32_t>(added);
+    if (wants_interval(out)) r.quantile = static_cast<float>(quantile_for(options, added));
+    r.quantiles = static_cast<std::uint32_t>(quantiles.size() / sizeof(float));
+    for (cl_mem m : {tau.mem, out.estimate.mem, out.standard_error.mem, out.bias.mem, out.lower.mem, out.upper.mem, out.kind,
+                     out.gain.mem, out.needed.mem, out.flags, flag_rows, quantiles.mem()})
+        launch.arg(m);
+    return launch.arg(r);
 }
 
 cl_event combine(const Engine& engine, View m, View t, View tau, const CombineOutput& out, CombineOptions options,
                  std::span<const cl_event> wait_list) {
     check_stateless(options);
+    check_outputs(out);
     check_view("m", m, m.count);
     check_view("t", t, m.count);
-    const Reading reading{tau, out, options};
-    reading.check(m.count);
+    Reading{tau, out, options}.check(m.count);
     check_overlap("estimate", out.estimate, "m", m);
     check_overlap("estimate", out.estimate, "t", t);
-    return read_means(engine, m, t, reading, wait_list).give();
+    return read_means(engine, m, t, tau, out, nullptr, options.zero, wait_list).give();
 }
 
 Combined combine(const Engine& engine, std::span<const float> m, std::span<const float> t, const Tau& tau,
@@ -161,7 +242,8 @@ Combined combine(const Engine& engine, std::span<const float> m, std::span<const
     const DeviceTau control = put(engine, tau, m.size());
     const Buffer mb = Buffer::from_host(engine, std::as_bytes(m)), tb = Buffer::from_host(engine, std::as_bytes(t));
     HostOutput out(engine, m.size(), options);
-    wait(read_means(engine, {mb.mem(), 0, m.size()}, {tb.mem(), 0, m.size()}, out.reading(control.view, options), {}));
+    wait(read_means(engine, {mb.mem(), 0, m.size()}, {tb.mem(), 0, m.size()}, control.view, out.output(), out.rows(),
+                    options.zero, {}));
     return out.take();
 }
 
@@ -189,10 +271,15 @@ Combined add_and_combine(Moments& moments, std::span<const HostBatch> batches, c
     const OnDevice in = put_on_device(s, batches);
     HostOutput out(s.engine, s.values, options);
     const Reading reading = out.reading(control.view, options);
-    const std::size_t fused = std::min<std::size_t>(batches.size(), CLR_BATCHES_PER_LAUNCH);
     const auto all = std::span<const Batch>(in.batches);
-    add_batches(s, all.first(all.size() - fused), {});
-    wait(add_batches(s, all.last(fused), &reading, {}));
+    if (fuses(s, reading)) {
+        const std::size_t fused = std::min<std::size_t>(all.size(), CLR_BATCHES_PER_LAUNCH);
+        add_batches(s, all.first(all.size() - fused), {});
+        wait(add_to_group(s, 0, all.last(fused), &reading, {}));
+    } else {
+        add_batches(s, all, {});
+        wait(read_moments(moments, reading, {}));
+    }
     return out.take();
 }
 
@@ -203,9 +290,12 @@ cl_event add_and_combine(Moments& moments, std::span<const Batch> batches, View 
     if (batches.empty() || batches.size() > CLR_BATCHES_PER_LAUNCH)
         throw InvalidArgument("batches", "1 to " + std::to_string(CLR_BATCHES_PER_LAUNCH), std::to_string(batches.size()));
     check_batches(s, batches);
+    check_room(s.batches(), batches.size());
     const Reading reading{tau, out, options};
     reading.check(s.values);
-    return add_batches(s, batches, &reading, wait_list).give();
+    if (fuses(s, reading)) return add_to_group(s, 0, batches, &reading, wait_list).give();
+    add_batches(s, batches, wait_list);
+    return read_moments(moments, reading, {}).give();
 }
 
 }  // namespace clratio

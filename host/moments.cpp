@@ -18,11 +18,24 @@ clr_two two_float(double x) {
     return {hi, static_cast<float>(x - static_cast<double>(hi))};
 }
 
-device::clr_batch describe(const View& m, const View& t, clr_two weight_before, clr_two added) {
-    const clr_two sum = device::clr_two_add(weight_before, added);
-    const auto entry = device::clr_entry_make(weight_before, added, sum);
-    return {layout(m),      layout(t),       added.hi,        added.lo, entry.share.hi,
-            entry.share.lo, entry.spread.hi, entry.spread.lo, sum.hi,   sum.lo};
+using Group = Moments::State::Group;
+
+/// How `more`, a batch or a whole state, enters a group.
+device::clr_batch describe(const View& m, const View& t, const Group& before, const Group& more) {
+    const clr_two sum = device::clr_two_add(before.weight, more.weight);
+    const clr_two sum2 = device::clr_two_add(before.weight2, more.weight2);
+    const auto e = device::clr_entry_make(before.weight, more.weight, sum);
+    return {layout(m),   layout(t),   more.weight.hi, more.weight.lo, e.share.hi, e.share.lo,
+            e.spread.hi, e.spread.lo, sum.hi,         sum.lo,         sum2.hi,    sum2.lo};
+}
+
+Group group_of(const Batch& b) {
+    const clr_two weight = two_float(b.weight);
+    return {1, weight, device::clr_two_square(weight)};
+}
+
+Group grown(const Group& before, const device::clr_batch& entry, std::uint64_t batches) {
+    return {before.batches + batches, {entry.sum_hi, entry.sum_lo}, {entry.sum2_hi, entry.sum2_lo}};
 }
 
 bool packed(const View& v) { return v.stride == v.channels; }
@@ -30,12 +43,6 @@ bool packed(const View& v) { return v.stride == v.channels; }
 void check_weight(double weight) {
     if (!(weight > 0) || weight > 1e30)
         throw InvalidArgument("weight", "a finite sample count above 0", std::to_string(weight));
-}
-
-void check_room(std::uint64_t batches, std::uint64_t more) {
-    constexpr std::uint64_t most = std::numeric_limits<std::uint32_t>::max();
-    if (more > most - batches)
-        throw InvalidArgument("batches", "at most 2^32 - 1 in one state", std::to_string(batches + more));
 }
 
 std::uint64_t count_nonfinite(const Engine& engine, const View& m, const View& t) {
@@ -69,16 +76,19 @@ std::vector<cl_mem StatePlanes::*> planes_of(MomentsOptions o) {
     using P = StatePlanes;
     std::vector<cl_mem P::*> all{&P::m, &P::t, &P::mm, &P::tt, &P::mt};
     if (o.nonfinite == NonFinite::skip) all.insert(all.end(), {&P::weight, &P::batches});
+    if (o.nonfinite == NonFinite::skip && o.weights == Weights::reliability) all.push_back(&P::weight2);
     if (o.ratios) all.insert(all.end(), {&P::quotient, &P::zero_m, &P::zero_share});
     return all;
 }
 
-std::uint64_t bytes_of(cl_mem StatePlanes::*plane, std::uint64_t values) {
-    return Moments::plane_bytes(values) / (plane == &StatePlanes::batches ? 2 : 1);
+std::uint64_t bytes_of(cl_mem StatePlanes::*plane, std::uint64_t values, const MomentsOptions& o) {
+    return o.groups * Moments::plane_bytes(values) / (plane == &StatePlanes::batches ? 2 : 1);
 }
 
 std::shared_ptr<Moments::State> make_state(const Engine& engine, std::uint64_t values, MomentsOptions options) {
     if (values == 0) throw InvalidArgument("values", "at least 1", "0");
+    if (options.groups < 1 || options.groups > CLR_MOST_GROUPS)
+        throw InvalidArgument("groups", "1 to " + std::to_string(CLR_MOST_GROUPS), std::to_string(options.groups));
     auto s = std::make_shared<Moments::State>(engine, values, options);
     s->add_rows = Buffer::zeroed(engine, most_work_items(engine) * CLR_TALLY_ADD * sizeof(std::uint64_t));
     return s;
@@ -86,40 +96,62 @@ std::shared_ptr<Moments::State> make_state(const Engine& engine, std::uint64_t v
 
 }  // namespace
 
-device::clr_state Moments::State::header() const {
-    const std::uint32_t kinds =
-        (options.nonfinite == NonFinite::skip ? CLR_STATE_PER_VALUE : 0u) | (options.ratios ? CLR_STATE_RATIOS : 0u);
-    return {plane_stride(values), kinds, static_cast<std::uint32_t>(batches), weight.hi, weight.lo};
+std::uint64_t Moments::State::batches() const {
+    std::uint64_t sum = 0;
+    for (const Group& g : groups) sum += g.batches;
+    return sum;
+}
+
+device::clr_groups Moments::State::all_groups() const {
+    device::clr_groups all{};
+    all.stride = plane_stride(values);
+    all.options = (options.nonfinite == NonFinite::skip ? CLR_STATE_PER_VALUE : 0u) |
+                  (options.ratios ? CLR_STATE_RATIOS : 0u) |
+                  (options.weights == Weights::reliability ? CLR_STATE_RELIABILITY : 0u);
+    all.count = options.groups;
+    for (std::size_t g = 0; g < groups.size(); ++g)
+        all.of[g] = {static_cast<std::uint32_t>(groups[g].batches), groups[g].weight.hi, groups[g].weight.lo,
+                     groups[g].weight2.hi, groups[g].weight2.lo};
+    return all;
+}
+
+device::clr_state Moments::State::state_of(std::size_t group) const {
+    const auto all = all_groups();
+    return {2 * group * all.stride, all.stride, all.of[group], all.options};
 }
 
 Launch& Moments::State::give_planes(Launch& launch) const {
-    for (cl_mem p : {planes.m, planes.t, planes.mm, planes.tt, planes.mt, planes.weight, planes.batches, planes.quotient,
-                     planes.zero_m, planes.zero_share})
+    for (cl_mem p : {planes.m, planes.t, planes.mm, planes.tt, planes.mt, planes.weight, planes.weight2, planes.batches,
+                     planes.quotient, planes.zero_m, planes.zero_share})
         launch.arg(p);
-    return launch.arg(header());
+    return launch;
 }
 
-Event add_batches(Moments::State& s, std::span<const Batch> batches, const Reading* reading,
-                  std::span<const cl_event> waits) {
-    check_room(s.batches, batches.size());
+Event add_to_group(Moments::State& s, std::size_t group, std::span<const Batch> batches, const Reading* reading,
+                   std::span<const cl_event> waits) {
     device::clr_batches table{};
     table.count = static_cast<std::uint32_t>(batches.size());
     table.packed = std::all_of(batches.begin(), batches.end(), [](const Batch& b) { return packed(b.m) && packed(b.t); });
-    clr_two weight = s.weight;
+    Group sum = s.groups[group];
     Launch launch(s.engine, "moments", "clr_add");
     for (std::size_t k = 0; k < CLR_BATCHES_PER_LAUNCH; ++k) {
         const Batch& b = batches[std::min(k, batches.size() - 1)];
         launch.arg(b.m.mem).arg(b.t.mem);
         if (k >= batches.size()) continue;
-        table.of[k] = describe(b.m, b.t, weight, two_float(b.weight));
-        weight = {table.of[k].sum_hi, table.of[k].sum_lo};
+        table.of[k] = describe(b.m, b.t, sum, group_of(b));
+        sum = grown(sum, table.of[k], 1);
     }
-    s.give_planes(launch.arg(table)).arg(s.add_rows);
-    (reading ? *reading : Reading{}).give(launch);
+    s.give_planes(launch.arg(table)).arg(s.state_of(group)).arg(s.add_rows);
+    (reading ? *reading : Reading{}).give(launch, s, s.batches() + batches.size());
     s.last = launch.after(waits).after(std::array{s.last.get()}).run_ranges(s.values);
-    s.batches += batches.size();
-    s.weight = weight;
+    s.groups[group] = sum;
     return s.last;
+}
+
+void check_room(std::uint64_t batches, std::uint64_t more) {
+    constexpr std::uint64_t most = std::numeric_limits<std::uint32_t>::max();
+    if (more > most - batches)
+        throw InvalidArgument("batches", "at most 2^32 - 1 in one state", std::to_string(batches + more));
 }
 
 void check_batches(const Moments::State& s, std::span<const Batch> batches) {
@@ -135,7 +167,7 @@ void check_batches(const Moments::State& s, std::span<const Batch> batches) {
 Moments::Moments(const Engine& engine, std::uint64_t values, MomentsOptions options)
     : state_(make_state(engine, values, options)) {
     for (auto plane : planes_of(options)) {
-        const Buffer b(engine, bytes_of(plane, values));
+        const Buffer b(engine, bytes_of(plane, values, options));
         state_->planes.*plane = b.mem();
         state_->owned.push_back(Memory::share(b.mem()));
     }
@@ -144,8 +176,8 @@ Moments::Moments(const Engine& engine, std::uint64_t values, MomentsOptions opti
 Moments::Moments(const Engine& engine, std::uint64_t values, MomentsOptions options, const StatePlanes& planes)
     : state_(make_state(engine, values, options)) {
     for (auto plane : planes_of(options)) {
-        check_view("state plane", {planes.*plane, 0, bytes_of(plane, values) / sizeof(float)},
-                   bytes_of(plane, values) / sizeof(float));
+        const std::uint64_t floats = bytes_of(plane, values, options) / sizeof(float);
+        check_view("state plane", {planes.*plane, 0, floats}, floats);
         state_->planes.*plane = planes.*plane;
         state_->owned.push_back(Memory::share(planes.*plane));
     }
@@ -156,7 +188,7 @@ std::uint64_t Moments::plane_bytes(std::uint64_t values) { return plane_stride(v
 
 std::uint64_t Moments::state_bytes(std::uint64_t values, MomentsOptions options) {
     std::uint64_t sum = 0;
-    for (auto plane : planes_of(options)) sum += bytes_of(plane, values);
+    for (auto plane : planes_of(options)) sum += bytes_of(plane, values, options);
     return sum;
 }
 
@@ -176,20 +208,25 @@ OnDevice put_on_device(const Moments::State& s, std::span<const HostBatch> batch
     for (const auto& b : batches) {
         check_weight(b.weight);
         const View m = put("m", b.m), t = put("t", b.t);
-        out.batches.push_back({m, t, b.weight});
+        out.batches.push_back({m, t, b.weight, b.index});
     }
     if (s.options.nonfinite == NonFinite::fail) refuse_nonfinite(s.engine, out.batches);
-    check_room(s.batches, batches.size());
+    check_room(s.batches(), batches.size());
     return out;
 }
 
 Event add_batches(Moments::State& s, std::span<const Batch> batches, std::span<const cl_event> waits) {
+    std::vector<std::vector<Batch>> of_group(s.groups.size());
+    const std::uint64_t before = s.batches();
+    for (std::size_t k = 0; k < batches.size(); ++k)
+        of_group[batches[k].index.value_or(before + k) % s.groups.size()].push_back(batches[k]);
     Event done;
-    while (!batches.empty()) {
-        const auto now = batches.first(std::min<std::size_t>(batches.size(), CLR_BATCHES_PER_LAUNCH));
-        done = add_batches(s, now, nullptr, waits);
-        batches = batches.subspan(now.size());
-    }
+    for (std::size_t g = 0; g < of_group.size(); ++g)
+        for (std::span<const Batch> left = of_group[g]; !left.empty();) {
+            const auto now = left.first(std::min<std::size_t>(left.size(), CLR_BATCHES_PER_LAUNCH));
+            done = add_to_group(s, g, now, nullptr, waits);
+            left = left.subspan(now.size());
+        }
     return done;
 }
 
@@ -202,7 +239,7 @@ cl_event Moments::add(std::span<const Batch> batches, std::span<const cl_event> 
     auto& s = *state_;
     if (batches.empty()) throw InvalidArgument("batches", "at least one", "none");
     check_batches(s, batches);
-    check_room(s.batches, batches.size());
+    check_room(s.batches(), batches.size());
     return add_batches(s, batches, wait_list).give();
 }
 
@@ -211,20 +248,19 @@ cl_event Moments::merge(const Moments& other, std::span<const cl_event> wait_lis
     const auto& b = *other.state_;
     if (a.values != b.values) throw InvalidArgument("merge", std::to_string(a.values) + " values", std::to_string(b.values));
     if (&a.engine.state() != &b.engine.state()) throw InvalidArgument("merge", "a state on the same Engine", "another's");
-    if (a.options.nonfinite != b.options.nonfinite || a.options.ratios != b.options.ratios)
-        throw InvalidArgument("merge", "a state with the same options", "others");
-    check_room(a.batches, b.batches);
-    Launch launch(a.engine, "moments", "clr_merge");
-    const auto entry = describe({}, {}, a.weight, b.weight);
-    b.give_planes(a.give_planes(launch))
-        .arg(entry)
-        .arg(a.add_rows)
-        .arg(b.add_rows)
-        .arg(a.add_rows.size() / sizeof(std::uint64_t));
-    a.last = launch.after(wait_list).after(std::array{a.last.get(), b.last.get()}).run_ranges(a.values);
+    if (a.options != b.options) throw InvalidArgument("merge", "a state with the same options", "others");
+    check_room(a.batches(), b.batches());
+    for (std::size_t g = 0; g < a.groups.size(); ++g) {
+        if (b.groups[g].batches == 0 && g > 0) continue;
+        const auto entry = describe({}, {}, a.groups[g], b.groups[g]);
+        const std::uint64_t row_words = g == 0 ? a.add_rows.size() / sizeof(std::uint64_t) : 0;
+        Launch launch(a.engine, "moments", "clr_merge");
+        a.give_planes(launch).arg(a.state_of(g));
+        b.give_planes(launch).arg(b.state_of(g)).arg(entry).arg(a.add_rows).arg(b.add_rows).arg(row_words);
+        a.last = launch.after(wait_list).after(std::array{a.last.get(), b.last.get()}).run_ranges(a.values);
+        a.groups[g] = grown(a.groups[g], entry, b.groups[g].batches);
+    }
     other.state_->last = a.last;
-    a.batches += b.batches;
-    a.weight = {entry.sum_hi, entry.sum_lo};
     return Event(a.last).give();
 }
 
@@ -234,13 +270,16 @@ void Moments::clear() {
     auto& s = *state_;
     wait(s.last);
     s.add_rows.write(std::vector<std::byte>(s.add_rows.size()));
-    s.batches = 0;
-    s.weight = {0, 0};
+    s.groups.assign(s.groups.size(), {});
 }
 
 std::uint64_t Moments::size() const { return state_->values; }
-std::uint64_t Moments::batches() const { return state_->batches; }
-double Moments::weight() const { return static_cast<double>(state_->weight.hi) + static_cast<double>(state_->weight.lo); }
+std::uint64_t Moments::batches() const { return state_->batches(); }
+double Moments::weight() const {
+    double sum = 0;
+    for (const auto& g : state_->groups) sum += static_cast<double>(g.weight.hi) + static_cast<double>(g.weight.lo);
+    return sum;
+}
 MomentsOptions Moments::options() const { return state_->options; }
 const Engine& Moments::engine() const { return state_->engine; }
 StatePlanes Moments::planes() const { return state_->planes; }
@@ -251,14 +290,15 @@ std::vector<std::uint32_t> Moments::bits(cl_mem StatePlanes::*plane) const {
     const auto& s = *state_;
     const cl_mem mem = s.planes.*plane;
     if (!mem) return {};
-    const std::size_t parts = plane == &StatePlanes::batches ? 1 : 2;
+    const std::size_t parts = (plane == &StatePlanes::batches ? 1 : 2) * s.groups.size();
     std::vector<std::uint32_t> out(parts * s.values);
-    if (s.batches == 0) return out;
     wait(s.last);
-    for (std::size_t p = 0; p < parts; ++p)
+    for (std::size_t p = 0; p < parts; ++p) {
+        if (s.groups[p * s.groups.size() / parts].batches == 0) continue;
         check(clEnqueueReadBuffer(s.engine.queue(), mem, CL_TRUE, p * plane_stride(s.values) * sizeof(float),
                                   s.values * sizeof(float), out.data() + p * s.values, 0, nullptr, nullptr),
               "clEnqueueReadBuffer");
+    }
     return out;
 }
 

@@ -16,14 +16,19 @@ struct Moments::State {
     Engine engine;
     std::uint64_t values;
     MomentsOptions options;
-    std::uint64_t batches = 0;
-    device::clr_two weight{0, 0};
+    struct Group {
+        std::uint64_t batches = 0;
+        device::clr_two weight{0, 0}, weight2{0, 0};
+    };
+    std::vector<Group> groups = std::vector<Group>(options.groups);
     std::vector<Memory> owned;
     StatePlanes planes;
     Buffer add_rows;
     Event last;  ///< the last launch that touched the planes
 
-    device::clr_state header() const;
+    std::uint64_t batches() const;
+    device::clr_state state_of(std::size_t group) const;
+    device::clr_groups all_groups() const;
     Launch& give_planes(Launch& launch) const;  ///< the CLR_PLANE_ARGUMENTS
 };
 
@@ -33,13 +38,17 @@ struct Reading {
     CombineOutput out;
     CombineOptions options;
     cl_mem flag_rows = nullptr;
+    Buffer quantiles{};  ///< of the interval, where values differ in their number of batches
 
     void check(std::uint64_t count) const;
-    Launch& give(Launch& launch) const;
+    Launch& give(Launch& launch, const Moments::State& state, std::uint64_t added) const;
 };
 
 /// Weights, sizes and the nonfinite policy of batches that come as views.
 void check_batches(const Moments::State& state, std::span<const Batch> batches);
+
+/// Throws InvalidArgument where a state would hold more batches than it can count.
+void check_room(std::uint64_t batches, std::uint64_t more);
 
 /// Host batches as views, with the buffers under them. Checks what Moments::add promises to check.
 struct OnDevice {
@@ -48,13 +57,13 @@ struct OnDevice {
 };
 OnDevice put_on_device(const Moments::State& state, std::span<const HostBatch> batches);
 
-/// Adds 1 to 8 batches in one launch, and reads out in the same pass where asked.
-Event add_batches(Moments::State& state, std::span<const Batch> batches, const Reading* reading,
-                  std::span<const cl_event> waits);
-/// Adds any number of batches, 8 in a launch; the event of the last.
+/// Adds 1 to 8 batches to one group in one launch, and reads out in the same pass where asked.
+Event add_to_group(Moments::State& state, std::size_t group, std::span<const Batch> batches, const Reading* reading,
+                   std::span<const cl_event> waits);
+/// Adds any number of batches, 8 of a group in a launch; the event of the last.
 Event add_batches(Moments::State& state, std::span<const Batch> batches, std::span<const cl_event> waits);
 
-/// Names a plane that the estimator needs and the state lacks.
+/// Names what the estimator needs and the state lacks, and options out of range.
 void check_estimator(const CombineOptions& options, const MomentsOptions& state);
 
 }  // namespace clratio

@@ -1,30 +1,61 @@
 // Reads estimates out of moments, or straight out of one pair of means.
+// A program with CLR_ESTIMATOR is for that estimator, and for estimate, error and flags alone: what they do not need costs
+// nothing. One without it is for everything.
 #include "clratio/device/planes.h"
 
 kernel void clr_combine(global const float* m, clr_layout m_layout, global const float* t, clr_layout t_layout,
-                        CLR_READING_ARGUMENTS, clr_range range) {
+                        global const float* tau, clr_layout tau_layout, global float* estimate, clr_layout estimate_layout,
+                        global float* flags, global ulong* flag_rows, uint zero_policy, clr_range range) {
+    const clr_layout packed = {0, 1, 1};
     clr_flag_tally tally = {{(clr_uint)(0u)}};
     const clr_span span = clr_my_span(range);
     for (ulong v = span.begin; v < span.end; v += span.step) {
         const ulong first = v * CLR_WIDTH;
-        const clr_real control = clr_load_view(tau, reading.tau, first, range.count);
-        const clr_estimate e = clr_read_means(clr_load_view(m, m_layout, first, range.count),
-                                              clr_load_view(t, t_layout, first, range.count), control, reading.zero_policy);
-        clr_write_reading(e, reading, estimate, error, flags, &tally, first, range.count);
+        const clr_plain_ratio r =
+            clr_read_means(clr_load_view(m, m_layout, first, range.count), clr_load_view(t, t_layout, first, range.count),
+                           clr_load_view(tau, tau_layout, first, range.count), zero_policy);
+        if (estimate) clr_store_view(r.value, estimate, estimate_layout, first, range.count);
+        if (flags) clr_store_view(clr_from_bits(r.flags), flags, packed, first, range.count);
+        clr_count_flags(&tally, first + CLR_WIDTH <= range.count ? r.flags : r.flags & clr_lanes_below(first, range.count));
     }
     clr_store_flag_tally(&tally, flag_rows);
 }
 
-kernel void clr_combine_moments(CLR_PLANE_ARGUMENTS(s), CLR_READING_ARGUMENTS, clr_range range) {
-    const clr_planes planes = CLR_PLANES(s);
+static inline clr_state clr_state_of(clr_groups groups, uint g) {
+    const clr_state s = {2 * g * groups.stride, groups.stride, groups.of[g], groups.options};
+    return s;
+}
+
+static inline clr_record clr_load_group(clr_planes base, clr_groups groups, uint g, ulong i) {
+    const clr_state s = clr_state_of(groups, g);
+    return clr_load_record(clr_planes_at(base, s.base), s, i);
+}
+
+kernel void clr_combine_moments(CLR_PLANE_ARGUMENTS(s), clr_groups groups, CLR_READING_ARGUMENTS, clr_range range) {
+    const clr_planes base = CLR_PLANES(s);
+    const clr_outputs to = CLR_OUTPUTS;
+    clr_question ask = reading.ask;
+#if defined(CLR_ESTIMATOR)
+    ask.estimator = CLR_ESTIMATOR;
+    ask.outputs &= CLR_WRITE_ESTIMATE | CLR_WRITE_ERROR | CLR_WRITE_FLAGS;
+#endif
     clr_flag_tally tally = {{(clr_uint)(0u)}};
     const clr_span span = clr_my_span(range);
     for (ulong v = span.begin; v < span.end; v += span.step) {
         const ulong first = v * CLR_WIDTH;
-        const clr_record r = clr_load_record(planes, s_state, first);
         const clr_real control = clr_load_view(tau, reading.tau, first, range.count);
-        const clr_estimate e = clr_read_record(r, s_state.batches, control, reading);
-        clr_write_reading(e, reading, estimate, error, flags, &tally, first, range.count);
+        clr_record all = clr_load_group(base, groups, 0, first);
+        all.moments = clr_moments_settle(all.moments);
+        for (uint g = 1; g < groups.count; ++g)
+            all = clr_record_merge(all, clr_load_group(base, groups, g, first), clr_uses_ratios(ask.estimator));
+        const clr_quotient q = clr_divide_means(all.moments.m, all.moments.t, control, ask.zero_policy);
+        clr_folds folds = clr_folds_begin();
+        if (clr_uses_groups(ask.estimator))
+            for (uint g = 0; g < groups.count; ++g)
+                folds = clr_fold(folds, all, q, clr_load_group(base, groups, g, first), control, ask.estimator);
+        const clr_real quantile = clr_quantile_for(all.batches, reading, quantiles);
+        const clr_estimate e = clr_read_out(all, q, folds, reading.added, control, quantile, ask);
+        clr_write_reading(e, reading, ask.outputs, to, &tally, first, range.count);
     }
     clr_store_flag_tally(&tally, flag_rows);
 }

@@ -8,8 +8,6 @@
 
 static inline clr_uint clr_one_where(clr_mask m) { return m ? (clr_uint)(1u) : (clr_uint)(0u); }
 
-static inline clr_two clr_both(float hi, float lo) { return clr_two_make((clr_real)(hi), (clr_real)(lo)); }
-
 static inline clr_entry clr_entry_of(const clr_batch* batch) {
     clr_entry e;
     e.share = clr_both(batch->share_hi, batch->share_lo);
@@ -37,7 +35,7 @@ typedef struct {
 
 static inline clr_real clr_lost_before(clr_planes planes, clr_state s, ulong i) {
     if (!(s.options & CLR_STATE_PER_VALUE)) return (clr_real)(0.0f);
-    return clr_load_batches(planes, s, i) == (clr_uint)(s.batches) ? (clr_real)(0.0f) : (clr_real)(1.0f);
+    return clr_load_batches(planes, s, i) == (clr_uint)(s.group.batches) ? (clr_real)(0.0f) : (clr_real)(1.0f);
 }
 
 // What a batch brings to vector v: how many negative values, and whether any is not finite.
@@ -61,7 +59,7 @@ static inline uint clr_pass(const bool is_first, const bool is_last, uint k, con
     global const float* t_from = in->t[k] + batch.t.offset + first;
     global const float* m_next = in->m[next] + batches->of[next].m.offset + first;
     global const float* t_next = in->t[next] + batches->of[next].t.offset + first;
-    const clr_two sum = clr_both(batch.sum_hi, batch.sum_lo);
+    const clr_two sum = clr_both(batch.sum_hi, batch.sum_lo), sum2 = clr_both(batch.sum2_hi, batch.sum2_lo);
     const bool skips = s.options & CLR_STATE_PER_VALUE;
     const clr_entry e = clr_entry_of(&batch);
     clr_uint below = *negative;
@@ -73,7 +71,7 @@ static inline uint clr_pass(const bool is_first, const bool is_last, uint k, con
         if (!is_last) clr_look(m_next, t_next, v, &doubt, &below);
         const clr_moments moments =
             clr_moments_add(is_first ? clr_load_moments(planes, s, at) : block->moments[v], clr_load(m_from + v * CLR_WIDTH),
-                            clr_load(t_from + v * CLR_WIDTH), e, s.batches + k);
+                            clr_load(t_from + v * CLR_WIDTH), e, s.group.batches + k);
         if (!is_last) {
             block->moments[v] = moments;
             block->doubt[v] = doubt;
@@ -81,7 +79,7 @@ static inline uint clr_pass(const bool is_first, const bool is_last, uint k, con
             doubtful |= 1u << v;
         } else {
             clr_store_moments(moments, planes, s.stride, at);
-            if (skips) clr_store_evidence(sum, (clr_uint)(s.batches + batches->count), planes, s.stride, at);
+            if (skips) clr_store_evidence(sum, sum2, (clr_uint)(s.group.batches + batches->count), planes, s, at);
         }
     }
     *negative = below;
@@ -113,9 +111,10 @@ static inline void clr_add_vector(const clr_inputs* in, const clr_batches* batch
             clr_two_make(bad ? zero : (clr_real)(batch.weight_hi), bad ? zero : (clr_real)(batch.weight_lo));
         const clr_two sum = clr_two_add(r.weight, added);
         const clr_entry e = clr_entry_make(r.weight, added, sum);
-        r.moments = clr_moments_add(r.moments, bad ? zero : m, bad ? zero : t, e, s.batches + k);
+        r.moments = clr_moments_add(r.moments, bad ? zero : m, bad ? zero : t, e, s.group.batches + k);
         if (s.options & CLR_STATE_RATIOS) r.ratios = clr_ratios_add(r.ratios, bad ? zero : m, bad ? zero : t, e);
         r.weight = sum;
+        if (s.options & CLR_STATE_RELIABILITY) r.weight2 = clr_two_add(r.weight2, clr_two_square(added));
         r.batches += clr_one_where(!bad);
         *negative += clr_one_where(m < zero) + clr_one_where(t < zero);
         *skipped += clr_one_where(bad);
@@ -123,15 +122,19 @@ static inline void clr_add_vector(const clr_inputs* in, const clr_batches* batch
     clr_store_record(r, planes, s, first);
 }
 
-kernel void clr_add(CLR_EACH_BATCH(CLR_BATCH_ARGUMENTS) clr_batches batches, CLR_PLANE_ARGUMENTS(s), global ulong* add_rows,
-                    CLR_READING_ARGUMENTS, clr_range range) {
+kernel void clr_add(CLR_EACH_BATCH(CLR_BATCH_ARGUMENTS) clr_batches batches, CLR_PLANE_ARGUMENTS(s), clr_state s_state,
+                    global ulong* add_rows, CLR_READING_ARGUMENTS, clr_range range) {
     const clr_inputs in = {{CLR_EACH_BATCH(CLR_M)}, {CLR_EACH_BATCH(CLR_T)}};
-    const clr_planes planes = CLR_PLANES(s);
+    const clr_planes base = CLR_PLANES(s), planes = clr_planes_at(base, s_state.base);
+    const clr_outputs to = CLR_OUTPUTS;
+    clr_question ask = reading.ask;
+    ask.estimator = min(ask.estimator, CLR_ESTIMATOR_MEAN_OF_RATIOS);
+    ask.outputs &= CLR_WRITE_ESTIMATE | CLR_WRITE_ERROR | CLR_WRITE_FLAGS;
     const bool plain = batches.packed && !(s_state.options & CLR_STATE_RATIOS);
+    const clr_batch last = batches.of[batches.count - 1];
+    const clr_group grown = {s_state.group.batches + batches.count, last.sum_hi, last.sum_lo, last.sum2_hi, last.sum2_lo};
     clr_state after = s_state;
-    after.batches += batches.count;
-    after.weight_hi = batches.of[batches.count - 1].sum_hi;
-    after.weight_lo = batches.of[batches.count - 1].sum_lo;
+    after.group = grown;
     clr_uint negative = (clr_uint)(0u), skipped = (clr_uint)(0u);
     clr_flag_tally tally = {{(clr_uint)(0u)}};
 
@@ -145,45 +148,45 @@ kernel void clr_add(CLR_EACH_BATCH(CLR_BATCH_ARGUMENTS) clr_batches batches, CLR
         for (ulong at = first; left; left >>= 1, at += CLR_WIDTH)
             if (left & 1u)
                 clr_add_vector(&in, &batches, planes, s_state, at, range.count, whole ? &counted : &negative, &skipped);
-        if (reading.outputs)
+        if (ask.outputs)
             for (ulong k = 0; k < done; ++k) {
                 const ulong at = first + k * CLR_WIDTH;
                 const clr_real control = clr_load_view(tau, reading.tau, at, range.count);
-                const clr_estimate e = clr_read_record(clr_load_record(planes, after, at), after.batches, control, reading);
-                clr_write_reading(e, reading, estimate, error, flags, &tally, at, range.count);
+                clr_record r = clr_load_record(planes, after, at);
+                r.moments = clr_moments_settle(r.moments);
+                const clr_quotient q = clr_divide_means(r.moments.m, r.moments.t, control, ask.zero_policy);
+                const clr_estimate e = clr_read_out(r, q, clr_folds_begin(), reading.added, control, (clr_real)(0.0f), ask);
+                clr_write_reading(e, reading, ask.outputs, to, &tally, at, range.count);
             }
         v += done * span.step;
     }
     add_rows[get_global_id(0) * CLR_TALLY_ADD + CLR_TALLY_NEGATIVE] += clr_sum_lanes(negative);
     add_rows[get_global_id(0) * CLR_TALLY_ADD + CLR_TALLY_SKIPPED] += clr_sum_lanes(skipped);
-    if (reading.outputs) clr_store_flag_tally(&tally, flag_rows);
+    if (ask.outputs) clr_store_flag_tally(&tally, flag_rows);
 }
 
-// entry: how b enters a for values that skipped nothing on either side.
-kernel void clr_merge(CLR_PLANE_ARGUMENTS(a), CLR_PLANE_ARGUMENTS(b), clr_batch entry, global ulong* a_rows,
-                      global const ulong* b_rows, ulong row_words, clr_range range) {
+// entry: how b enters a for values that skipped nothing on either side; row_words of counters are added too.
+kernel void clr_merge(CLR_PLANE_ARGUMENTS(a), clr_state a_state, CLR_PLANE_ARGUMENTS(b), clr_state b_state, clr_batch entry,
+                      global ulong* a_rows, global const ulong* b_rows, ulong row_words, clr_range range) {
     for (ulong i = get_global_id(0); i < row_words; i += get_global_size(0)) a_rows[i] += b_rows[i];
-    const clr_planes to = CLR_PLANES(a), from = CLR_PLANES(b);
+    const clr_planes a_base = CLR_PLANES(a), b_base = CLR_PLANES(b);
+    const clr_planes to = clr_planes_at(a_base, a_state.base), from = clr_planes_at(b_base, b_state.base);
     const clr_real zero = (clr_real)(0.0f);
     const bool skips = a_state.options & CLR_STATE_PER_VALUE;
+    const clr_two whole = clr_both(entry.sum_hi, entry.sum_lo), whole2 = clr_both(entry.sum2_hi, entry.sum2_lo);
     const clr_span span = clr_my_span(range);
     for (ulong v = span.begin; v < span.end; v += span.step) {
         const ulong first = v * CLR_WIDTH;
-        const clr_moments moments = clr_load_moments(to, a_state, first);
-        const clr_moments other = clr_load_moments(from, b_state, first);
-        clr_entry e = clr_entry_of(&entry);
-        if (skips) {
-            clr_two weight = clr_both(entry.sum_hi, entry.sum_lo);
-            const clr_uint batches = clr_load_batches(to, a_state, first), more = clr_load_batches(from, b_state, first);
-            if (clr_any(clr_lost_before(to, a_state, first) + clr_lost_before(from, b_state, first) != zero)) {
-                const clr_two before = clr_load_plane(to.weight, a_state, first);
-                const clr_two added = clr_load_plane(from.weight, b_state, first);
-                weight = clr_two_add(before, added);
-                e = clr_entry_make(before, added, weight);
-            }
-            clr_store_evidence(weight, batches + more, to, a_state.stride, first);
+        if (skips && clr_any(clr_lost_before(to, a_state, first) + clr_lost_before(from, b_state, first) != zero)) {
+            const clr_record a = clr_load_record(to, a_state, first), b = clr_load_record(from, b_state, first);
+            clr_store_record(clr_record_merge(a, b, (a_state.options & CLR_STATE_RATIOS) != 0), to, a_state, first);
+            continue;
         }
-        clr_store_moments(clr_moments_merge(moments, other, e), to, a_state.stride, first);
+        const clr_entry e = clr_entry_of(&entry);
+        const clr_moments moments = clr_load_moments(to, a_state, first), more = clr_load_moments(from, b_state, first);
+        clr_store_moments(clr_moments_merge(moments, more, e), to, a_state.stride, first);
+        if (skips)
+            clr_store_evidence(whole, whole2, (clr_uint)(a_state.group.batches + b_state.group.batches), to, a_state, first);
         if (a_state.options & CLR_STATE_RATIOS) {
             const clr_ratios sum =
                 clr_ratios_merge(clr_load_ratios(to, a_state, first), clr_load_ratios(from, b_state, first), e);

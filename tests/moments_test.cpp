@@ -64,16 +64,16 @@ std::vector<std::uint32_t> twin_bits(const Input& in) {
         for (auto& v : twin) all.push_back(std::bit_cast<std::uint32_t>(part(v).hi));
         for (auto& v : twin) all.push_back(std::bit_cast<std::uint32_t>(part(v).lo));
     };
-    two([](const TwinValue& v) { return v.moments.m; });
-    two([](const TwinValue& v) { return v.moments.t; });
-    two([](const TwinValue& v) { return v.moments.mm; });
-    two([](const TwinValue& v) { return v.moments.tt; });
-    two([](const TwinValue& v) { return v.moments.mt; });
-    two([](const TwinValue& v) { return v.weight; });
-    for (auto& v : twin) all.push_back(v.batches);
-    two([](const TwinValue& v) { return v.ratios.quotient; });
-    two([](const TwinValue& v) { return v.ratios.zero_m; });
-    two([](const TwinValue& v) { return v.ratios.zero_share; });
+    two([](const TwinValue& v) { return v.record.moments.m; });
+    two([](const TwinValue& v) { return v.record.moments.t; });
+    two([](const TwinValue& v) { return v.record.moments.mm; });
+    two([](const TwinValue& v) { return v.record.moments.tt; });
+    two([](const TwinValue& v) { return v.record.moments.mt; });
+    two([](const TwinValue& v) { return v.record.weight; });
+    for (auto& v : twin) all.push_back(v.record.batches);
+    two([](const TwinValue& v) { return v.record.ratios.quotient; });
+    two([](const TwinValue& v) { return v.record.ratios.zero_m; });
+    two([](const TwinValue& v) { return v.record.ratios.zero_share; });
     return all;
 }
 

@@ -4,6 +4,7 @@
 #include "clratio/combine.hpp"
 #include "clratio/engine.hpp"
 #include "clratio/error.hpp"
+#include "clratio/estimator.hpp"
 #include "clratio/exception.hpp"
 #include "clratio/fit.hpp"
 #include "clratio/histogram.hpp"

@@ -7,19 +7,12 @@
 #include <span>
 #include <vector>
 
-#include "clratio/device/ratio.h"
 #include "clratio/engine.hpp"
+#include "clratio/estimator.hpp"
 #include "clratio/moments.hpp"
 #include "clratio/view.hpp"
 
 namespace clratio {
-
-enum class Estimator {
-    ratio,           ///< tau mean(m) / mean(t), eq. (10); consistent, bias O(1/N)
-    mean,            ///< mean(m); unbiased, tau and t unused
-    mean_of_ratios,  ///< mean of finished ratios, eq. (5): a bias that no number of batches removes. Needs
-                     ///< MomentsOptions::ratios
-};
 
 /// What stands where the mean of t is 0 and tau is not.
 enum class Zero { mc_mean, zero, one };
@@ -27,21 +20,36 @@ enum class Zero { mc_mean, zero, one };
 struct CombineOptions {
     Estimator estimator = Estimator::ratio;
     Zero zero = Zero::mc_mean;
-    bool standard_error = false;  ///< also compute it (blocking form)
+    // What a blocking call computes besides the estimate; an event form writes the views it is given.
+    bool standard_error = false;
+    bool bias = false;      ///< of the ratio, estimated to first order
+    bool interval = false;  ///< lower, upper and kind
+    bool gain = false;      ///< predicted variance of the ratio over that of the plain mean, below 1 where it pays
+    bool needed = false;    ///< batches still to come until the standard error meets the target
+    double level = 0.95;    ///< of the interval, in (0, 1)
+    IntervalMethod method = IntervalMethod::fieller;
+    float target = 0, relative_target = 0;  ///< the larger of target and relative_target |estimate|
 };
 
 /// How many values carry each flag; the CLR_FLAG_* bits of device/ratio.h name them.
 struct FlagCounts {
-    std::uint64_t zero_denominator = 0, zero_tau = 0, skipped = 0, no_data = 0, no_error_bar = 0, nonfinite = 0;
+    std::uint64_t zero_denominator = 0, zero_tau = 0, skipped = 0, no_data = 0, no_error_bar = 0, nonfinite = 0,
+                  fell_back = 0, no_spread = 0;
     std::uint64_t any = 0;  ///< values with at least one of them
     std::uint64_t total() const { return any; }
 };
 
+/// Empty where not asked for.
 struct Combined {
     std::vector<float> estimate;
-    std::vector<float> standard_error;      ///< empty unless asked for
+    std::vector<float> standard_error;      ///< +inf where there is none
     std::vector<std::uint32_t> flag_image;  ///< a bit mask for each value
     FlagCounts flags;
+    std::vector<float> bias;          ///< estimated E[ratio] - truth; +inf where it is not known
+    std::vector<float> lower, upper;  ///< of the confidence interval
+    std::vector<std::uint32_t> kind;  ///< IntervalKind of each value
+    std::vector<float> gain;          ///< 1 where m does not vary
+    std::vector<float> needed;        ///< 0: the target is met; +inf where nothing is known
 };
 
 /// tau: one number, one for each of `channels` interleaved channels, or one for each value.
@@ -60,6 +68,8 @@ struct CombineOutput {
     View estimate;
     View standard_error;
     cl_mem flags = nullptr;
+    View bias{}, lower{}, upper{}, gain{}, needed{};
+    cl_mem kind = nullptr;  ///< uint32, contiguous
 };
 
 /// Stateless: one launch, no state, for those who hold their means (or equal-weight sums) already.
@@ -71,16 +81,21 @@ cl_event combine(const Engine& engine, View m, View t, View tau, const CombineOu
 Combined combine(const Engine& engine, std::span<const float> m, std::span<const float> t, const Tau& tau,
                  CombineOptions options = {});
 
-/// Reads the estimate out of moments. The standard error is the delta method's:
-/// |(tau + i) / (mean t + i)| sqrt((M2 m - 2 r C + r^2 M2 t) / ((K - 1) W)), K - 1 degrees of freedom; +inf for K < 2.
+/// Reads estimates out of moments: estimator.hpp says what each is, what it needs, and its error bar. Where the mean of t is
+/// 0 or tau is 0, all but the plain mean and the regressions give what the ratio gives.
+/// Confidence intervals: IntervalMethod::delta is estimate -+ q error, fieller is exact for normal means and belongs to the
+/// ratio whatever the estimator; q is Student's quantile at K - 1 degrees of freedom (regressions: K - 2), where K counts
+/// the value's own batches up to 1024 and the state's beyond. Errors: InvalidArgument for an estimator whose planes the
+/// state lacks (it says what to record), level, targets, views. Determinism: the same bits at every width and work size.
+/// Cost: one pass over the planes read (state_bytes()) and written.
 cl_event combine(const Moments& moments, View tau, const CombineOutput& out, CombineOptions options = {},
                  std::span<const cl_event> wait_list = {});
 Combined combine(const Moments& moments, const Tau& tau, CombineOptions options = {});
 
-/// Adds batches and reads out, the last 8 of them in the same pass: for progressive display, and where all batches are
-/// there.
+/// Adds batches and reads out; ratio, mean and mean of ratios of a state without groups in the pass that adds the last 8
+/// batches, if nothing but estimate, error and flags is asked for. For progressive display, and where all batches are there.
 Combined add_and_combine(Moments& moments, std::span<const HostBatch> batches, const Tau& tau, CombineOptions options = {});
-/// At most 8 batches, one launch.
+/// At most 8 batches.
 cl_event add_and_combine(Moments& moments, std::span<const Batch> batches, View tau, const CombineOutput& out,
                          CombineOptions options = {}, std::span<const cl_event> wait_list = {});
 

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -18,29 +19,43 @@ enum class NonFinite {
     fail,       ///< the whole batch is refused with InvalidArgument, the state stays as it was (blocking calls only)
 };
 
-struct MomentsOptions {
-    NonFinite nonfinite = NonFinite::skip;
-    bool ratios = false;  ///< record what the mean of ratios needs: 6 more planes
+/// What a batch's weight says. Only error bars differ, and the corrections of estimators that use them.
+enum class Weights {
+    samples,      ///< how many samples the batch is the mean of: its variance goes with 1/weight
+    reliability,  ///< how much it is trusted; all batches have the same variance. Records one more plane
 };
 
-/// One batch: m and t hold `count` values, each the mean of `weight` samples.
+struct MomentsOptions {
+    NonFinite nonfinite = NonFinite::skip;
+    bool ratios = false;       ///< record what the mean of ratios and Hartley-Ross need: 6 more planes
+    std::uint32_t groups = 1;  ///< 1 to 16; batch k goes to group k mod groups, each a state of its own
+    Weights weights = Weights::samples;
+    bool operator==(const MomentsOptions&) const = default;
+};
+
+/// One batch: m and t hold `count` values, each the mean of `weight` samples. Its index chooses its group: by default the
+/// number of batches added before it; where several machines share the work, its number among all batches.
 struct Batch {
     View m, t;
     double weight = 1;
+    std::optional<std::uint64_t> index{};
 };
 struct HostBatch {
     std::span<const float> m, t;
     double weight = 1;
+    std::optional<std::uint64_t> index{};
 };
 
 /// The device buffers of a state. A plane is plane_stride() float32 of hi parts, then as many lo parts; its value is hi +
-/// lo, where hi may be some ulps off the nearest float; `batches` is a single plane_stride() of uint32. weight and batches
-/// exist with NonFinite::skip, the last three with `ratios`, and are null otherwise.
+/// lo, where hi may be some ulps off the nearest float; `batches` is a single plane_stride() of uint32. With groups a buffer
+/// holds the planes of all groups one after the other. weight and batches exist with NonFinite::skip, weight2 if
+/// Weights::reliability is set besides, the last three with `ratios`; they are null otherwise.
 struct StatePlanes {
     cl_mem m = nullptr, t = nullptr;                                    ///< means
     cl_mem mm = nullptr, tt = nullptr, mt = nullptr;                    ///< second moments about the means
     cl_mem weight = nullptr, batches = nullptr;                         ///< of each value
     cl_mem quotient = nullptr, zero_m = nullptr, zero_share = nullptr;  ///< means of m/t; of m, and of 1, where t = 0
+    cl_mem weight2 = nullptr;                                           ///< sums of squared weights
 };
 
 /// Two-float difference-form Welford/Chan moments of (m, t), theory: Chan, Golub, LeVeque 1979, with sample counts as
@@ -51,12 +66,13 @@ struct StatePlanes {
 /// Weights: finite and positive, else InvalidArgument; the sum is exact for integers below 2^48.
 /// Determinism: the same batches in the same order give the same bits at every width and work size, and however
 /// many are added in one call; another grouping, merged, agrees within 2 ulp of the estimate.
-/// Cost: state_bytes() on the device (40 bytes a value, 52 with skip); 8 batches a launch, which reads and writes the state
-/// once. Not for concurrent use of one object; several objects may share an Engine across threads.
+/// Cost: state_bytes() on the device (40 bytes a value, 52 with skip; times groups); 8 batches a launch, or the batches of
+/// one group, which reads and writes the state of the group once. Not for concurrent use of one object; several objects may
+/// share an Engine across threads.
 class Moments {
 public:
     Moments(const Engine& engine, std::uint64_t values, MomentsOptions options = {});
-    /// On the caller's buffers, of plane_bytes() each (`batches`: half of it), of any content; they are retained.
+    /// On the caller's buffers, of groups * plane_bytes() each (`batches`: half of it), of any content; they are retained.
     Moments(const Engine& engine, std::uint64_t values, MomentsOptions options, const StatePlanes& planes);
 
     static std::uint64_t plane_stride(std::uint64_t values);  ///< elements
@@ -86,8 +102,8 @@ public:
     std::uint64_t negatives() const;
     std::uint64_t skipped() const;
 
-    /// The values of a plane in its own order, hi parts then lo parts without padding, as bits; empty where the state lacks
-    /// it.
+    /// The values of a plane in its own order, group by group hi parts then lo parts without padding, as bits; empty where
+    /// the state lacks it.
     std::vector<std::uint32_t> bits(cl_mem StatePlanes::*plane) const;
     StatePlanes planes() const;
 

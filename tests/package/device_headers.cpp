@@ -43,8 +43,8 @@ struct Value {
         weight = sum;
     }
     float estimate() const {
-        return clr_read_out(moments, {}, {batches, weight.hi}, batches, tau, CLR_ESTIMATOR_RATIO, CLR_ZERO_MC_MEAN, true)
-            .value;
+        const clr_moments settled = clr_moments_settle(moments);
+        return clr_divide_means(settled.m, settled.t, tau, CLR_ZERO_MC_MEAN).value;
     }
 };
 

@@ -2,51 +2,67 @@
 #pragma once
 
 #include <bit>
+#include <span>
 #include <vector>
 
-#include "clratio/device/ratio.h"
+#include "clratio/device/estimator.h"
 
 namespace clratio::test {
 
 struct TwinValue {
-    device::clr_moments moments{};
-    device::clr_ratios ratios{};
-    device::clr_two weight{};
-    std::uint32_t batches = 0, offered = 0;
+    device::clr_record record{};
+    std::uint32_t offered = 0;
 
     void add(float m, float t, double w) {
         using namespace device;
         const std::uint32_t index = offered++;
         if (!clr_is_finite(m) || !clr_is_finite(t)) {
-            if (clr_settles(index)) moments = clr_moments_settle(moments);
+            if (clr_settles(index)) record.moments = clr_moments_settle(record.moments);
             return;
         }
         const auto hi = static_cast<float>(w);
         const clr_two added{hi, static_cast<float>(w - static_cast<double>(hi))};
-        const clr_two sum = clr_two_add(weight, added);
-        const clr_entry entry = clr_entry_make(weight, added, sum);
-        moments = clr_moments_add(moments, m, t, entry, index);
-        ratios = clr_ratios_add(ratios, m, t, entry);
-        weight = sum;
-        ++batches;
+        const clr_two sum = clr_two_add(record.weight, added);
+        const clr_entry entry = clr_entry_make(record.weight, added, sum);
+        record.moments = clr_moments_add(record.moments, m, t, entry, index);
+        record.ratios = clr_ratios_add(record.ratios, m, t, entry);
+        record.weight = sum;
+        record.weight2 = clr_two_add(record.weight2, clr_two_square(added));
+        ++record.batches;
     }
 
     void merge(const TwinValue& b) {
-        using namespace device;
-        const clr_two sum = clr_two_add(weight, b.weight);
-        const clr_entry entry = clr_entry_make(weight, b.weight, sum);
-        moments = clr_moments_merge(moments, b.moments, entry);
-        ratios = clr_ratios_merge(ratios, b.ratios, entry);
-        weight = sum;
-        batches += b.batches;
+        record = device::clr_record_merge(record, b.record, true);
         offered += b.offered;
     }
-
-    device::clr_estimate read(float tau, std::uint32_t added, std::uint32_t estimator = CLR_ESTIMATOR_RATIO,
-                              std::uint32_t zero = CLR_ZERO_MC_MEAN) const {
-        return device::clr_read_out(moments, ratios, {batches, weight.hi}, added, tau, estimator, zero, true);
-    }
 };
+
+/// What a kernel reads out of the groups of a value.
+inline device::clr_estimate read_twin(std::span<const TwinValue> groups, float tau, const device::clr_question& ask,
+                                      float quantile = 0) {
+    using namespace device;
+    clr_record all = groups[0].record;
+    std::uint32_t offered = groups[0].offered;
+    all.moments = clr_moments_settle(all.moments);
+    for (const auto& g : groups.subspan(1)) {
+        all = clr_record_merge(all, g.record, clr_uses_ratios(ask.estimator));
+        offered += g.offered;
+    }
+    const clr_quotient q = clr_divide_means(all.moments.m, all.moments.t, tau, ask.zero_policy);
+    clr_folds folds = clr_folds_begin();
+    if (clr_uses_groups(ask.estimator))
+        for (const auto& g : groups) folds = clr_fold(folds, all, q, g.record, tau, ask.estimator);
+    return clr_read_out(all, q, folds, offered, tau, quantile, ask);
+}
+
+inline device::clr_estimate read_twin(const TwinValue& value, float tau, std::uint32_t estimator = CLR_ESTIMATOR_RATIO,
+                                      std::uint32_t zero = CLR_ZERO_MC_MEAN) {
+    device::clr_question ask{};
+    ask.estimator = estimator;
+    ask.zero_policy = zero;
+    ask.outputs = CLR_WRITE_ESTIMATE | CLR_WRITE_ERROR | CLR_WRITE_FLAGS;
+    return read_twin(std::span(&value, 1), tau, ask);
+}
 
 inline double value(device::clr_two x) { return static_cast<double>(x.hi) + static_cast<double>(x.lo); }
 

@@ -95,6 +95,26 @@ CLR_FN clr_ratios clr_ratios_add(clr_ratios s, clr_real m, clr_real t, clr_entry
     return clr_ratios_merge(s, b, e);
 }
 
+// Everything a state knows of its values. weight2 is the sum of squared weights, where reliability weights ask for it.
+typedef struct {
+    clr_moments moments;
+    clr_ratios ratios;
+    clr_two weight, weight2;
+    clr_uint batches;
+} clr_record;
+
+// b's batches as if they had been added after a's. Chan, Golub, LeVeque 1979.
+CLR_FN clr_record clr_record_merge(clr_record a, clr_record b, bool with_ratios) {
+    const clr_two sum = clr_two_add(a.weight, b.weight);
+    const clr_entry e = clr_entry_make(a.weight, b.weight, sum);
+    a.moments = clr_moments_merge(a.moments, b.moments, e);
+    if (with_ratios) a.ratios = clr_ratios_merge(a.ratios, b.ratios, e);
+    a.weight = sum;
+    a.weight2 = clr_two_add(a.weight2, b.weight2);
+    a.batches += b.batches;
+    return a;
+}
+
 CLR_NAMESPACE_END
 
 #endif

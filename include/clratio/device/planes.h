@@ -2,17 +2,18 @@
 #ifndef CLRATIO_DEVICE_PLANES_H
 #define CLRATIO_DEVICE_PLANES_H
 
+#include "clratio/device/estimator.h"
 #include "clratio/device/layout.h"
-#include "clratio/device/ratio.h"
 
 CLR_NAMESPACE_BEGIN
 
 #define CLR_BATCHES_PER_LAUNCH 8
 
-// One batch of a launch. share and spread are the clr_entry, and sum the weight after it, of a value that skipped nothing.
+// One batch of a launch. share and spread are the clr_entry, and sum and sum2 the weight and the sum of squared weights
+// after it, of a value that skipped nothing.
 typedef struct {
     clr_layout m, t;
-    float weight_hi, weight_lo, share_hi, share_lo, spread_hi, spread_lo, sum_hi, sum_lo;
+    float weight_hi, weight_lo, share_hi, share_lo, spread_hi, spread_lo, sum_hi, sum_lo, sum2_hi, sum2_lo;
 } clr_batch;
 
 typedef struct {
@@ -20,23 +21,37 @@ typedef struct {
     clr_u32 count, packed;  // packed: every view is contiguous
 } clr_batches;
 
-#define CLR_STATE_PER_VALUE 1u  // weight and batch count are planes
-#define CLR_STATE_RATIOS 2u     // the planes of clr_ratios are there
+#define CLR_STATE_PER_VALUE 1u    // weight and batch count are planes
+#define CLR_STATE_RATIOS 2u       // the planes of clr_ratios are there
+#define CLR_STATE_RELIABILITY 4u  // weight2 is kept, a plane with CLR_STATE_PER_VALUE
 
-// What holds for a whole state: its plane stride in elements and, unless CLR_STATE_PER_VALUE, its weight.
+#define CLR_MOST_GROUPS 16
+
+// What all values of a group share; unless CLR_STATE_PER_VALUE, its weight.
 typedef struct {
-    clr_u64 stride;
-    clr_u32 options, batches;
-    float weight_hi, weight_lo;
+    clr_u32 batches;
+    float weight_hi, weight_lo, weight2_hi, weight2_lo;
+} clr_group;
+
+// One group of a state: where its planes begin, in elements of a two-float plane, and their stride.
+typedef struct {
+    clr_u64 base, stride;
+    clr_group group;
+    clr_u32 options;
 } clr_state;
 
-#define CLR_WRITE_ESTIMATE 1u
-#define CLR_WRITE_ERROR 2u
-#define CLR_WRITE_FLAGS 4u
+// All groups of a state, at bases 0, 2 stride, 4 stride ..
+typedef struct {
+    clr_u64 stride;
+    clr_u32 options, count;
+    clr_group of[CLR_MOST_GROUPS];
+} clr_groups;
 
 typedef struct {
-    clr_layout tau, estimate, error;
-    clr_u32 estimator, zero_policy, outputs, unused;
+    clr_layout tau, estimate, error, bias, lower, upper, gain, needed;
+    clr_question ask;
+    float quantile;            // of the interval, for all batches
+    clr_u32 quantiles, added;  // quantiles[]: how many there are, for 0, 1, .. batches; batches offered so far
 } clr_reading;
 
 // A work-item's row of counters while adding, and while reading out: one for each flag, then values with any flag.
@@ -48,23 +63,25 @@ typedef struct {
 #if defined(__OPENCL_C_VERSION__)
 
 typedef struct {
-    global float *m, *t, *mm, *tt, *mt, *weight, *batches, *quotient, *zero_m, *zero_share;
+    global float *m, *t, *mm, *tt, *mt, *weight, *weight2, *batches, *quotient, *zero_m, *zero_share;
 } clr_planes;
 
 #define CLR_PLANE_ARGUMENTS(s)                                                                                              \
     global float *s##_m, global float *s##_t, global float *s##_mm, global float *s##_tt, global float *s##_mt,             \
-        global float *s##_weight, global float *s##_batches, global float *s##_quotient, global float *s##_zero_m,          \
-        global float *s##_zero_share, clr_state s##_state
+        global float *s##_weight, global float *s##_weight2, global float *s##_batches, global float *s##_quotient,         \
+        global float *s##_zero_m, global float *s##_zero_share
 #define CLR_PLANES(s)                                                                                                       \
-    { s##_m, s##_t, s##_mm, s##_tt, s##_mt, s##_weight, s##_batches, s##_quotient, s##_zero_m, s##_zero_share }
+    { s##_m, s##_t, s##_mm, s##_tt, s##_mt, s##_weight, s##_weight2, s##_batches, s##_quotient, s##_zero_m, s##_zero_share }
 
-// Everything a state knows of CLR_WIDTH values.
-typedef struct {
-    clr_moments moments;
-    clr_ratios ratios;
-    clr_two weight;
-    clr_uint batches;
-} clr_record;
+// The planes of one group.
+static inline clr_planes clr_planes_at(clr_planes p, ulong base) {
+    const clr_planes at = {p.m + base,        p.t + base,      p.mm + base,        p.tt + base,
+                           p.mt + base,       p.weight + base, p.weight2 + base,   p.batches + base / 2,
+                           p.quotient + base, p.zero_m + base, p.zero_share + base};
+    return at;
+}
+
+static inline clr_two clr_both(float hi, float lo) { return clr_two_make((clr_real)(hi), (clr_real)(lo)); }
 
 static inline clr_two clr_load_two(global const float* p, ulong i, ulong stride) {
     return clr_two_make(clr_load(p + i), clr_load(p + stride + i));
@@ -75,11 +92,9 @@ static inline void clr_store_two(clr_two v, global float* p, ulong i, ulong stri
     clr_store(v.lo, p + stride + i);
 }
 
-static inline clr_two clr_two_zero(void) { return clr_two_make((clr_real)(0.0f), (clr_real)(0.0f)); }
-
-// A state without batches is zero, whatever its planes hold: they are never cleared.
+// A group without batches is zero, whatever its planes hold: they are never cleared.
 static inline clr_two clr_load_plane(global const float* p, clr_state s, ulong i) {
-    return s.batches == 0 ? clr_two_zero() : clr_load_two(p, i, s.stride);
+    return s.group.batches == 0 ? clr_both(0.0f, 0.0f) : clr_load_two(p, i, s.stride);
 }
 
 static inline clr_moments clr_load_moments(clr_planes p, clr_state s, ulong i) {
@@ -100,8 +115,10 @@ static inline void clr_store_moments(clr_moments s, clr_planes p, ulong stride, 
     clr_store_two(s.mt, p.mt, i, stride);
 }
 
-static inline void clr_store_evidence(clr_two weight, clr_uint batches, clr_planes p, ulong stride, ulong i) {
-    clr_store_two(weight, p.weight, i, stride);
+static inline void clr_store_evidence(clr_two weight, clr_two weight2, clr_uint batches, clr_planes p, clr_state s,
+                                      ulong i) {
+    clr_store_two(weight, p.weight, i, s.stride);
+    if (s.options & CLR_STATE_RELIABILITY) clr_store_two(weight2, p.weight2, i, s.stride);
     clr_store(clr_from_bits(batches), p.batches + i);
 }
 
@@ -114,7 +131,7 @@ static inline clr_ratios clr_load_ratios(clr_planes p, clr_state s, ulong i) {
 }
 
 static inline clr_uint clr_load_batches(clr_planes p, clr_state s, ulong i) {
-    return s.batches == 0 ? (clr_uint)(0u) : clr_bits(clr_load(p.batches + i));
+    return s.group.batches == 0 ? (clr_uint)(0u) : clr_bits(clr_load(p.batches + i));
 }
 
 static inline void clr_store_ratios(clr_ratios r, clr_planes p, ulong stride, ulong i) {
@@ -126,30 +143,23 @@ static inline void clr_store_ratios(clr_ratios r, clr_planes p, ulong stride, ul
 static inline clr_record clr_load_record(clr_planes p, clr_state s, ulong i) {
     clr_record r;
     r.moments = clr_load_moments(p, s, i);
+    r.weight = clr_both(s.group.weight_hi, s.group.weight_lo);
+    r.weight2 = clr_both(s.group.weight2_hi, s.group.weight2_lo);
+    r.batches = (clr_uint)(s.group.batches);
     if (s.options & CLR_STATE_PER_VALUE) {
         r.weight = clr_load_plane(p.weight, s, i);
+        if (s.options & CLR_STATE_RELIABILITY) r.weight2 = clr_load_plane(p.weight2, s, i);
         r.batches = clr_load_batches(p, s, i);
-    } else {
-        r.weight = clr_two_make((clr_real)(s.weight_hi), (clr_real)(s.weight_lo));
-        r.batches = (clr_uint)(s.batches);
     }
-    r.ratios.quotient = r.ratios.zero_m = r.ratios.zero_share = clr_two_zero();
+    r.ratios.quotient = r.ratios.zero_m = r.ratios.zero_share = clr_both(0.0f, 0.0f);
     if (s.options & CLR_STATE_RATIOS) r.ratios = clr_load_ratios(p, s, i);
     return r;
 }
 
 static inline void clr_store_record(clr_record r, clr_planes p, clr_state s, ulong i) {
     clr_store_moments(r.moments, p, s.stride, i);
-    if (s.options & CLR_STATE_PER_VALUE) clr_store_evidence(r.weight, r.batches, p, s.stride, i);
+    if (s.options & CLR_STATE_PER_VALUE) clr_store_evidence(r.weight, r.weight2, r.batches, p, s, i);
     if (s.options & CLR_STATE_RATIOS) clr_store_ratios(r.ratios, p, s.stride, i);
-}
-
-static inline clr_estimate clr_read_record(clr_record r, uint added, clr_real tau, clr_reading reading) {
-    clr_evidence n;
-    n.batches = r.batches;
-    n.weight = r.weight.hi;
-    return clr_read_out(r.moments, r.ratios, n, added, tau, reading.estimator, reading.zero_policy,
-                        (reading.outputs & CLR_WRITE_ERROR) != 0);
 }
 
 static inline ulong clr_sum_lanes(clr_uint v) {
@@ -183,15 +193,38 @@ static inline void clr_store_flag_tally(const clr_flag_tally* tally, global ulon
 }
 
 #define CLR_READING_ARGUMENTS                                                                                               \
-    global const float *tau, global float *estimate, global float *error, global float *flags, global ulong *flag_rows,     \
-        clr_reading reading
+    global const float *tau, global float *estimate, global float *error, global float *bias, global float *lower,          \
+        global float *upper, global float *kind, global float *gain, global float *needed, global float *flags,             \
+        global ulong *flag_rows, global const float *quantiles, clr_reading reading
+#define CLR_OUTPUTS                                                                                                         \
+    { estimate, error, bias, lower, upper, kind, gain, needed, flags }
 
-static inline void clr_write_reading(clr_estimate e, clr_reading reading, global float* estimate, global float* error,
-                                     global float* flags, clr_flag_tally* tally, ulong first, ulong count) {
+typedef struct {
+    global float *estimate, *error, *bias, *lower, *upper, *kind, *gain, *needed, *flags;
+} clr_outputs;
+
+// The interval's quantile for each value's own number of batches; beyond the table, that of the whole state.
+static inline clr_real clr_quantile_for(clr_uint batches, clr_reading reading, global const float* quantiles) {
+    if (reading.quantiles == 0) return (clr_real)(reading.quantile);
+    uint count[CLR_WIDTH];
+    float lane[CLR_WIDTH];
+    clr_store(batches, count);
+    for (int i = 0; i < CLR_WIDTH; ++i) lane[i] = count[i] < reading.quantiles ? quantiles[count[i]] : reading.quantile;
+    return clr_load(lane);
+}
+
+static inline void clr_write_reading(clr_estimate e, clr_reading reading, uint wanted, clr_outputs to, clr_flag_tally* tally,
+                                     ulong first, ulong count) {
     const clr_layout packed = {0, 1, 1};
-    if (reading.outputs & CLR_WRITE_ESTIMATE) clr_store_view(e.value, estimate, reading.estimate, first, count);
-    if (reading.outputs & CLR_WRITE_ERROR) clr_store_view(e.error, error, reading.error, first, count);
-    if (reading.outputs & CLR_WRITE_FLAGS) clr_store_view(clr_from_bits(e.flags), flags, packed, first, count);
+    if (wanted & CLR_WRITE_ESTIMATE) clr_store_view(e.value, to.estimate, reading.estimate, first, count);
+    if (wanted & CLR_WRITE_ERROR) clr_store_view(e.error, to.error, reading.error, first, count);
+    if (wanted & CLR_WRITE_BIAS) clr_store_view(e.bias, to.bias, reading.bias, first, count);
+    if (wanted & CLR_WRITE_LOWER) clr_store_view(e.lower, to.lower, reading.lower, first, count);
+    if (wanted & CLR_WRITE_UPPER) clr_store_view(e.upper, to.upper, reading.upper, first, count);
+    if (wanted & CLR_WRITE_KIND) clr_store_view(clr_from_bits(e.kind), to.kind, packed, first, count);
+    if (wanted & CLR_WRITE_GAIN) clr_store_view(e.gain, to.gain, reading.gain, first, count);
+    if (wanted & CLR_WRITE_NEEDED) clr_store_view(e.needed, to.needed, reading.needed, first, count);
+    if (wanted & CLR_WRITE_FLAGS) clr_store_view(clr_from_bits(e.flags), to.flags, packed, first, count);
     clr_count_flags(tally, first + CLR_WIDTH <= count ? e.flags : e.flags & clr_lanes_below(first, count));
 }
 

@@ -81,6 +81,9 @@ CLR_FN clr_two clr_two_multiply(clr_two x, clr_two y) {
     return clr_two_make(p.hi, clr_fma(x.lo, y.lo, clr_fma(x.hi, y.lo, clr_fma(x.lo, y.hi, p.lo))));
 }
 
+// x^2, tight.
+CLR_FN clr_two clr_two_square(clr_two x) { return clr_two_settle(clr_two_multiply(x, x)); }
+
 // x / y, relative error below 2^-43; y.hi != 0.
 CLR_FN clr_two clr_two_divide(clr_two x, clr_two y) {
     const clr_real q = x.hi / y.hi;
