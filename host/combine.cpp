@@ -117,7 +117,7 @@ Event read_moments(const Moments& moments, Reading reading, std::span<const cl_e
     auto& s = moments.state();
     if (wants_interval(reading.out) && s.options.nonfinite == NonFinite::skip)
         reading.quantiles = quantile_table(s, reading.options);
-    Launch launch(s.engine, "combine", "clr_combine_moments", program_options(reading));
+    Launch launch(s.engine, "combine", "clr_combine_moments", program_options(reading), Lanes::wide);
     s.give_planes(launch).arg(s.all_groups());
     s.last = reading.give(launch, s, s.batches()).after(waits).after(std::array{s.last.get()}).run_ranges(s.values);
     return s.last;
@@ -125,7 +125,7 @@ Event read_moments(const Moments& moments, Reading reading, std::span<const cl_e
 
 Event read_means(const Engine& engine, const View& m, const View& t, const View& tau, const CombineOutput& out,
                  cl_mem flag_rows, Zero zero, std::span<const cl_event> waits) {
-    Launch launch(engine, "combine", "clr_combine");
+    Launch launch(engine, "combine", "clr_combine", "", Lanes::wide);
     launch.view(m).view(t).view(tau).view(out.estimate).arg(out.flags).arg(flag_rows).arg(zero_policy(zero));
     return launch.after(waits).run_ranges(m.count);
 }

@@ -162,10 +162,12 @@ void check_overlap(const char* name, const View& output, const char* other_name,
                               "one that overlaps it");
 }
 
-Launch::Launch(const Engine& engine, const std::string& word, const std::string& kernel, const std::string& options)
-    : engine_(engine), word_(word), name_(kernel), options_(options) {
+Launch::Launch(const Engine& engine, const std::string& word, const std::string& kernel, const std::string& options,
+               Lanes lanes)
+    : engine_(engine), word_(word), name_(kernel), options_(options),
+      width_(lanes == Lanes::wide ? engine.state().wide : engine.width()) {
     cl_int code = CL_SUCCESS;
-    kernel_ = Kernel(clCreateKernel(program(engine.state(), word, options).get(), kernel.c_str(), &code));
+    kernel_ = Kernel(clCreateKernel(program(engine.state(), word, width_, options).get(), kernel.c_str(), &code));
     check(code, "clCreateKernel");
 }
 
@@ -187,7 +189,7 @@ Launch& Launch::after(std::span<const cl_event> events) {
 
 Event Launch::run_ranges(std::uint64_t count) {
     const auto& s = engine_.state();
-    const auto width = static_cast<std::uint64_t>(s.width);
+    const auto width = static_cast<std::uint64_t>(width_);
     const std::uint64_t vectors = std::max<std::uint64_t>(1, (count + width - 1) / width);
     if (s.grouped) {
         arg(device::clr_range{count, 0});
@@ -210,7 +212,7 @@ Event Launch::enqueue(std::size_t global, std::size_t local) {
           "clEnqueueNDRangeKernel");
     Event event(done);
     check(clFlush(engine_.queue()), "clFlush");
-    save_program(engine_.state(), word_, options_, event);
+    save_program(engine_.state(), word_, width_, options_, event);
     return event;
 }
 

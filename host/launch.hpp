@@ -51,10 +51,14 @@ void check_view(const char* name, const View& view, std::uint64_t count);
 /// Throws InvalidArgument where an output shares elements with another view without being the same view.
 void check_overlap(const char* name, const View& output, const char* other_name, const View& other);
 
+/// How many lanes a kernel has: the engine's, or two vectors in step (Engine::State::wide).
+enum class Lanes { engine, wide };
+
 /// One kernel call: arguments in order, then how to run it.
 class Launch {
 public:
-    Launch(const Engine& engine, const std::string& word, const std::string& kernel, const std::string& options = "");
+    Launch(const Engine& engine, const std::string& word, const std::string& kernel, const std::string& options = "",
+           Lanes lanes = Lanes::engine);
 
     Launch& arg(cl_mem mem);
     Launch& arg(const Buffer& buffer) { return arg(buffer.mem()); }
@@ -76,6 +80,7 @@ private:
 
     Engine engine_;
     std::string word_, name_, options_;
+    int width_;
     Kernel kernel_;
     cl_uint next_ = 0;
     std::vector<cl_event> waits_;

@@ -11,7 +11,7 @@ namespace {
 
 using device::clr_two;
 
-constexpr std::uint64_t widest = 16;  // lanes; planes are padded to it, so that kernels load and store whole vectors
+constexpr std::uint64_t widest = 32;  // lanes; planes are padded to it, so that kernels load and store whole vectors
 
 clr_two two_float(double x) {
     const auto hi = static_cast<float>(x);
@@ -133,7 +133,7 @@ Event add_to_group(Moments::State& s, std::size_t group, std::span<const Batch> 
     table.count = static_cast<std::uint32_t>(batches.size());
     table.packed = std::all_of(batches.begin(), batches.end(), [](const Batch& b) { return packed(b.m) && packed(b.t); });
     Group sum = s.groups[group];
-    Launch launch(s.engine, "moments", "clr_add");
+    Launch launch(s.engine, "moments", "clr_add", "", reading ? Lanes::wide : Lanes::engine);
     for (std::size_t k = 0; k < CLR_BATCHES_PER_LAUNCH; ++k) {
         const Batch& b = batches[std::min(k, batches.size() - 1)];
         launch.arg(b.m.mem).arg(b.t.mem);

@@ -40,9 +40,9 @@ void flatten(const EmbeddedFile& file, std::set<std::string_view>& done, std::st
     }
 }
 
-std::string build_options(const Engine::State& s, const std::string& extra) {
-    std::string o = "-cl-std=CL1.2 -DCLR_WIDTH=" + std::to_string(s.width) + " -DCLR_GROUPED=" + (s.grouped ? "1" : "0") +
-                    " -DCLR_FP64=" + (s.info.fp64 ? "1" : "0");
+std::string build_options(const Engine::State& s, int width, const std::string& extra) {
+    std::string o = "-cl-std=CL1.2 -DCLR_WIDTH=" + std::to_string(width) + " -DCLR_GROUPED=" + (s.grouped ? "1" : "0") +
+                    " -DCLR_FP64=" + (s.info.fp64 && width <= 16 ? "1" : "0");
     if (s.info.correctly_rounded_divide) o += " -cl-fp32-correctly-rounded-divide-sqrt";
     return extra.empty() ? o : o + " " + extra;
 }
@@ -52,6 +52,10 @@ std::string cache_key(const Engine::State& s, const std::string& word, const std
     const auto& d = s.info;
     return d.platform + "|" + d.name + "|" + d.version + "|" + d.driver + "|" + word + "|" + options + "|" +
            std::to_string(cache::fnv1a(source.data(), source.size()));
+}
+
+std::string name_of(const std::string& word, int width, const std::string& extra) {
+    return word + " " + std::to_string(width) + " " + extra;
 }
 
 bool build(cl_program p, cl_device_id device, const std::string& options) {
@@ -114,13 +118,13 @@ std::string device_source() {
     return out;
 }
 
-Program program(Engine::State& s, const std::string& word, const std::string& extra) {
+Program program(Engine::State& s, const std::string& word, int width, const std::string& extra) {
     const std::scoped_lock lock(s.mutex);
-    const std::string name = word + " " + extra;
+    const std::string name = name_of(word, width, extra);
     if (const auto known = s.programs.find(name); known != s.programs.end()) return known->second.program;
 
     const std::string source = flatten_kernel(word);
-    const std::string options = build_options(s, extra);
+    const std::string options = build_options(s, width, extra);
     const auto folder = s.options.disk_cache ? cache::folder() : std::filesystem::path();
     if (!folder.empty()) {
         const std::string key = cache_key(s, word, options, source);
@@ -132,11 +136,11 @@ Program program(Engine::State& s, const std::string& word, const std::string& ex
     return p;
 }
 
-void save_program(Engine::State& s, const std::string& word, const std::string& extra, const Event& first) {
+void save_program(Engine::State& s, const std::string& word, int width, const std::string& extra, const Event& first) {
     const std::scoped_lock lock(s.mutex);
-    const auto built = s.programs.find(word + " " + extra);
+    const auto built = s.programs.find(name_of(word, width, extra));
     if (built == s.programs.end() || !std::exchange(built->second.unsaved, false)) return;
-    const std::string key = cache_key(s, word, build_options(s, extra), flatten_kernel(word));
+    const std::string key = cache_key(s, word, build_options(s, width, extra), flatten_kernel(word));
     s.savers.emplace_back([p = built->second.program, first, key, path = cache::entry(cache::folder(), key)] {
         const cl_event e = first.get();
         clWaitForEvents(1, &e);

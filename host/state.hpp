@@ -17,6 +17,7 @@ struct Engine::State {
     DeviceInfo info;
     EngineOptions options;
     int width = 1;
+    int wide = 1;  ///< lanes of kernels whose every value is one long chain: two vectors in step where that pays
     bool grouped = false;
     std::uint32_t work_items = 1;
 
@@ -25,14 +26,14 @@ struct Engine::State {
         Program program;
         bool unsaved;
     };
-    std::map<std::string, Built> programs;  ///< by word and build options
+    std::map<std::string, Built> programs;  ///< by word, width and build options
     std::vector<std::jthread> savers;       ///< write binaries to the disk cache; joined before the programs go
 };
 
 /// The program of kernels/WORD.cl: from memory, from the disk cache, or built now.
-Program program(Engine::State& state, const std::string& word, const std::string& options);
+Program program(Engine::State& state, const std::string& word, int width, const std::string& options);
 
 /// Where this process built the program: once `first` is done, keeps its binary on disk, in the background.
-void save_program(Engine::State& state, const std::string& word, const std::string& options, const Event& first);
+void save_program(Engine::State& state, const std::string& word, int width, const std::string& options, const Event& first);
 
 }  // namespace clratio

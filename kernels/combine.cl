@@ -31,6 +31,19 @@ static inline clr_record clr_load_group(clr_planes base, clr_groups groups, uint
     return clr_load_record(clr_planes_at(base, s.base), s, i);
 }
 
+// What the batches of all groups are worth together, where no value has skipped any.
+static inline clr_evidence clr_whole_evidence(clr_groups groups, uint reliability) {
+    clr_group sum = groups.of[0];
+    clr_two weight = clr_both(sum.weight_hi, sum.weight_lo), weight2 = clr_both(sum.weight2_hi, sum.weight2_lo);
+    for (uint g = 1; g < groups.count; ++g) {
+        const clr_group more = groups.of[g];
+        sum.batches += more.batches;
+        weight = clr_two_add(weight, clr_both(more.weight_hi, more.weight_lo));
+        weight2 = clr_two_add(weight2, clr_both(more.weight2_hi, more.weight2_lo));
+    }
+    return clr_evidence_of((clr_uint)(sum.batches), weight, weight2, reliability);
+}
+
 kernel void clr_combine_moments(CLR_PLANE_ARGUMENTS(s), clr_groups groups, CLR_READING_ARGUMENTS, clr_range range) {
     const clr_planes base = CLR_PLANES(s);
     const clr_outputs to = CLR_OUTPUTS;
@@ -39,12 +52,15 @@ kernel void clr_combine_moments(CLR_PLANE_ARGUMENTS(s), clr_groups groups, CLR_R
     ask.estimator = CLR_ESTIMATOR;
     ask.outputs &= CLR_WRITE_ESTIMATE | CLR_WRITE_ERROR | CLR_WRITE_FLAGS;
 #endif
+    const clr_state first_group = clr_state_of(groups, 0);
+    const clr_evidence whole = clr_whole_evidence(groups, ask.reliability);
+    const bool skips = groups.options & CLR_STATE_PER_VALUE;
     clr_flag_tally tally = {{(clr_uint)(0u)}};
     const clr_span span = clr_my_span(range);
     for (ulong v = span.begin; v < span.end; v += span.step) {
         const ulong first = v * CLR_WIDTH;
         const clr_real control = clr_load_view(tau, reading.tau, first, range.count);
-        clr_record all = clr_load_group(base, groups, 0, first);
+        clr_record all = clr_load_record(base, first_group, first);
         all.moments = clr_moments_settle(all.moments);
         for (uint g = 1; g < groups.count; ++g)
             all = clr_record_merge(all, clr_load_group(base, groups, g, first), clr_uses_ratios(ask.estimator));
@@ -53,8 +69,9 @@ kernel void clr_combine_moments(CLR_PLANE_ARGUMENTS(s), clr_groups groups, CLR_R
         if (clr_uses_groups(ask.estimator))
             for (uint g = 0; g < groups.count; ++g)
                 folds = clr_fold(folds, all, q, clr_load_group(base, groups, g, first), control, ask.estimator);
-        const clr_real quantile = clr_quantile_for(all.batches, reading, quantiles);
-        const clr_estimate e = clr_read_out(all, q, folds, reading.added, control, quantile, ask);
+        const clr_evidence n = skips ? clr_evidence_of(all.batches, all.weight, all.weight2, ask.reliability) : whole;
+        const clr_estimate e =
+            clr_read_out(all, q, n, folds, reading.added, control, clr_quantile_for(all.batches, reading, quantiles), ask);
         clr_write_reading(e, reading, ask.outputs, to, &tally, first, range.count);
     }
     clr_store_flag_tally(&tally, flag_rows);

@@ -24,6 +24,8 @@ typedef struct {
 // other, and few streams run through memory at a time. GPUs keep one vector in registers.
 #if CLR_GROUPED
 #define CLR_BLOCK 1
+#elif CLR_WIDTH == 32
+#define CLR_BLOCK 16
 #else
 #define CLR_BLOCK 32
 #endif
@@ -135,19 +137,21 @@ kernel void clr_add(CLR_EACH_BATCH(CLR_BATCH_ARGUMENTS) clr_batches batches, CLR
     const clr_group grown = {s_state.group.batches + batches.count, last.sum_hi, last.sum_lo, last.sum2_hi, last.sum2_lo};
     clr_state after = s_state;
     after.group = grown;
+    const bool skips = s_state.options & CLR_STATE_PER_VALUE;
+    const clr_evidence whole = clr_evidence_of_group(grown, ask.reliability);
     clr_uint negative = (clr_uint)(0u), skipped = (clr_uint)(0u);
     clr_flag_tally tally = {{(clr_uint)(0u)}};
 
     const clr_span span = clr_my_span(range);
     for (ulong v = span.begin; v < span.end;) {
         const ulong first = v * CLR_WIDTH;
-        const bool whole = plain && v + CLR_BLOCK <= span.end && first + CLR_BLOCK * CLR_WIDTH <= range.count;
-        const ulong done = whole ? CLR_BLOCK : 1;
+        const bool in_block = plain && v + CLR_BLOCK <= span.end && first + CLR_BLOCK * CLR_WIDTH <= range.count;
+        const ulong done = in_block ? CLR_BLOCK : 1;
         clr_uint counted = (clr_uint)(0u);
-        uint left = whole ? clr_add_block(&in, &batches, planes, s_state, first, &negative) : 1u;
+        uint left = in_block ? clr_add_block(&in, &batches, planes, s_state, first, &negative) : 1u;
         for (ulong at = first; left; left >>= 1, at += CLR_WIDTH)
             if (left & 1u)
-                clr_add_vector(&in, &batches, planes, s_state, at, range.count, whole ? &counted : &negative, &skipped);
+                clr_add_vector(&in, &batches, planes, s_state, at, range.count, in_block ? &counted : &negative, &skipped);
         if (ask.outputs)
             for (ulong k = 0; k < done; ++k) {
                 const ulong at = first + k * CLR_WIDTH;
@@ -155,7 +159,9 @@ kernel void clr_add(CLR_EACH_BATCH(CLR_BATCH_ARGUMENTS) clr_batches batches, CLR
                 clr_record r = clr_load_record(planes, after, at);
                 r.moments = clr_moments_settle(r.moments);
                 const clr_quotient q = clr_divide_means(r.moments.m, r.moments.t, control, ask.zero_policy);
-                const clr_estimate e = clr_read_out(r, q, clr_folds_begin(), reading.added, control, (clr_real)(0.0f), ask);
+                const clr_evidence n = skips ? clr_evidence_of(r.batches, r.weight, r.weight2, ask.reliability) : whole;
+                const clr_estimate e =
+                    clr_read_out(r, q, n, clr_folds_begin(), reading.added, control, (clr_real)(0.0f), ask);
                 clr_write_reading(e, reading, ask.outputs, to, &tally, at, range.count);
             }
         v += done * span.step;

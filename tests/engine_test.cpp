@@ -115,7 +115,7 @@ TEST(Engine, nothing_is_compiled_before_it_is_needed) {
 TEST(Engine, a_failed_build_carries_the_log_with_the_real_file_and_line) {
     const Engine engine({.disk_cache = false});
     try {
-        program(engine.state(), "engine", "-DCLR_WIDTH=5");
+        program(engine.state(), "engine", 5, "");
         FAIL();
     } catch (const BuildError& e) {
         EXPECT_EQ(e.word, "engine");

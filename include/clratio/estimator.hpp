@@ -20,10 +20,10 @@ enum class Estimator : std::uint32_t {
     tin = CLR_ESTIMATOR_TIN,           ///< Tin 1965: bias O(1/N^2); can leave [0, tau]
     hartley_ross = CLR_ESTIMATOR_HARTLEY_ROSS,  ///< Hartley and Ross 1954: unbiased for batches of equal weight; suffers
                                                 ///< from small t
-    regression = CLR_ESTIMATOR_REGRESSION,  ///< mean(m) - beta (mean(t) - tau): least variance for large N
-    jackknife = CLR_ESTIMATOR_JACKKNIFE,    ///< delete-a-group, 2 groups: Quenouille 1956, Durbin 1959; any weights:
-                                            ///< Busing, Meijer and van der Leeden 1999. Bias O(1/N^2)
-    mickey = CLR_ESTIMATOR_MICKEY,          ///< Mickey 1959: unbiased, any weights
+    regression = CLR_ESTIMATOR_REGRESSION,      ///< mean(m) - beta (mean(t) - tau): least variance for large N
+    jackknife = CLR_ESTIMATOR_JACKKNIFE,        ///< delete-a-group, 2 groups: Quenouille 1956, Durbin 1959; any weights:
+                                                ///< Busing, Meijer and van der Leeden 1999. Bias O(1/N^2)
+    mickey = CLR_ESTIMATOR_MICKEY,              ///< Mickey 1959: unbiased, any weights
     crossfit_regression = CLR_ESTIMATOR_CROSSFIT_REGRESSION,  ///< regression with the slope of the other groups: unbiased
 };
 

@@ -15,7 +15,7 @@ struct Shape {
 
 inline std::vector<Shape> all_shapes() {
     using Path = EngineOptions::Path;
-    std::vector<Shape> shapes;
+    std::vector<Shape> shapes{{"automatic", {}}};
     for (const int width : {1, 2, 4, 8, 16}) {
         shapes.push_back({"ranges, width " + std::to_string(width), {.width = width, .path = Path::ranges}});
         shapes.push_back({"groups, width " + std::to_string(width), {.width = width, .path = Path::groups}});

@@ -52,7 +52,8 @@ inline device::clr_estimate read_twin(std::span<const TwinValue> groups, float t
     clr_folds folds = clr_folds_begin();
     if (clr_uses_groups(ask.estimator))
         for (const auto& g : groups) folds = clr_fold(folds, all, q, g.record, tau, ask.estimator);
-    return clr_read_out(all, q, folds, offered, tau, quantile, ask);
+    const clr_evidence n = clr_evidence_of(all.batches, all.weight, all.weight2, ask.reliability);
+    return clr_read_out(all, q, n, folds, offered, tau, quantile, ask);
 }
 
 inline device::clr_estimate read_twin(const TwinValue& value, float tau, std::uint32_t estimator = CLR_ESTIMATOR_RATIO,

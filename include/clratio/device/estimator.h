@@ -61,17 +61,15 @@ typedef struct {
     clr_mask few;
 } clr_evidence;
 
-CLR_FN clr_evidence clr_evidence_of(clr_record r, clr_u32 reliability) {
+CLR_FN clr_evidence clr_evidence_of(clr_uint batches, clr_two weight, clr_two weight2, clr_u32 reliability) {
     const clr_real zero = (clr_real)(0.0f), one = (clr_real)(1.0f);
     clr_evidence n;
-    n.batches = r.batches;
-    n.few = r.batches < (clr_uint)(2u);
-    const clr_real w = r.weight.hi;
-    clr_real divisor = clr_to_real(r.batches - (clr_uint)(1u)) * w, numerator = one;
+    n.batches = batches;
+    n.few = batches < (clr_uint)(2u);
+    clr_real divisor = clr_to_real(batches - (clr_uint)(1u)) * weight.hi, numerator = one;
     if (reliability) {
-        const clr_two rest = clr_two_subtract(clr_two_multiply(r.weight, r.weight), r.weight2);
-        divisor = w * rest.hi;
-        numerator = r.weight2.hi;
+        divisor = weight.hi * clr_two_subtract(clr_two_multiply(weight, weight), weight2).hi;
+        numerator = weight2.hi;
     }
     n.few = n.few || !(divisor > zero);
     n.scale = n.few ? zero : numerator / (n.few ? one : divisor);
@@ -325,13 +323,12 @@ CLR_FN clr_real clr_needed_of(clr_real value, clr_real error, clr_evidence n, cl
 // Any of the estimators, with all flags. `added`: batches that were offered to the state; quantile: of the interval. Only
 // what ask.outputs names is computed, save value and flags; without CLR_WRITE_ERROR the error only says whether it is
 // infinite.
-CLR_FN clr_estimate clr_read_out(clr_record r, clr_quotient q, clr_folds f, clr_u32 added, clr_real tau, clr_real quantile,
-                                 clr_question ask) {
+CLR_FN clr_estimate clr_read_out(clr_record r, clr_quotient q, clr_evidence n, clr_folds f, clr_u32 added, clr_real tau,
+                                 clr_real quantile, clr_question ask) {
     const clr_real zero = (clr_real)(0.0f), infinite = (clr_real)(INFINITY);
     const bool is_mean = ask.estimator == CLR_ESTIMATOR_MEAN, averages = ask.estimator == CLR_ESTIMATOR_MEAN_OF_RATIOS;
     const bool divides = !is_mean && !averages && !clr_is_regression(ask.estimator);
     const clr_mask never = clr_never(), no_data = r.batches == (clr_uint)(0u);
-    const clr_evidence n = clr_evidence_of(r, ask.reliability);
     const clr_residual d = clr_residual_of(r.moments, q.quotient);
 
     // Where eq. (10) gives the value by a rule of its own, so it does for its relatives.

@@ -83,6 +83,11 @@ static inline clr_planes clr_planes_at(clr_planes p, ulong base) {
 
 static inline clr_two clr_both(float hi, float lo) { return clr_two_make((clr_real)(hi), (clr_real)(lo)); }
 
+static inline clr_evidence clr_evidence_of_group(clr_group g, uint reliability) {
+    return clr_evidence_of((clr_uint)(g.batches), clr_both(g.weight_hi, g.weight_lo), clr_both(g.weight2_hi, g.weight2_lo),
+                           reliability);
+}
+
 static inline clr_two clr_load_two(global const float* p, ulong i, ulong stride) {
     return clr_two_make(clr_load(p + i), clr_load(p + stride + i));
 }

@@ -1,0 +1,54 @@
+// Reading each estimator and its error out of a state: values/s and bytes/s beside the in-place scaling of as many bytes as
+// the planes read and the images written.
+#include "support/device.hpp"
+
+using namespace clratio;
+using namespace clratio::bench;
+
+namespace {
+
+constexpr std::uint32_t groups = 8;
+
+std::uint64_t values_of(const benchmark::State& state) { return static_cast<std::uint64_t>(state.range(0)); }
+
+MomentsOptions options_for(Estimator e) {
+    const Needs needs = needs_of(e);
+    return {.nonfinite = NonFinite::propagate, .ratios = needs.ratios, .groups = needs.groups ? groups : 1};
+}
+
+/// Planes, tau, the estimate and the error.
+std::uint64_t bytes_moved(std::uint64_t n, Estimator e) {
+    return Moments::state_bytes(n, options_for(e)) + (e == Estimator::mean_of_ratios ? 8 : 12) * n;
+}
+
+void read_out(benchmark::State& state, Estimator e) {
+    const Engine engine;
+    const std::uint64_t n = values_of(state);
+    if (!fits(state, engine, bytes_moved(n, e), 8 * groups * n)) return;
+    Moments moments(engine, n, options_for(e));
+    const Array t(engine, n, 1.5f), tau(engine, n, 1.0f), out(engine, n, 0.0f), error(engine, n, 0.0f);
+    const Batch batch{tau.view(), t.view()};
+    for (std::uint32_t k = 0; k < 2 * groups; ++k) finish(moments.add(std::span(&batch, 1), {}));
+    const bool has_error = e != Estimator::mean_of_ratios;
+    const auto run = [&] {
+        finish(combine(moments, tau.view(), {out.view(), has_error ? error.view() : View{}, nullptr}, {.estimator = e}));
+    };
+    run();
+    for (auto _ : state) run();
+    report(state, n, bytes_moved(n, e));
+}
+
+void limit(benchmark::State& state) { scaling_limit(state, bytes_moved(values_of(state), Estimator::ratio)); }
+
+void sizes(benchmark::internal::Benchmark* b) {
+    b->RangeMultiplier(10)->Range(100000, 10000000)->MeasureProcessCPUTime()->UseRealTime();
+}
+
+const bool registered = [] {
+    benchmark::RegisterBenchmark("limit", limit)->Apply(sizes);
+    for (const Estimator e : all_estimators())
+        benchmark::RegisterBenchmark(("read_out/" + name_of(e)).c_str(), read_out, e)->Apply(sizes);
+    return true;
+}();
+
+}  // namespace
