@@ -1,0 +1,248 @@
+#include "clratio/snapshot.hpp"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <map>
+
+#include "moments_state.hpp"
+
+namespace clratio {
+namespace {
+
+using Settings = std::vector<std::pair<std::string, std::string>>;
+
+const std::map<std::string, NonFinite> nonfinites{
+    {"skip", NonFinite::skip}, {"propagate", NonFinite::propagate}, {"fail", NonFinite::fail}};
+
+Settings settings_of(const MomentsOptions& o) {
+    const auto same = [&](const auto& entry) { return entry.second == o.nonfinite; };
+    return {{"nonfinite", std::find_if(nonfinites.begin(), nonfinites.end(), same)->first},
+            {"ratios", o.ratios ? "1" : "0"}};
+}
+
+// ---- planes: words of a snapshot, and where they lie on the device
+
+struct Place {
+    const char* name;
+    cl_mem StatePlanes::*plane;
+    std::uint64_t part;  ///< strides into the plane
+};
+
+constexpr std::array places{
+    Place{"m.hi", &StatePlanes::m, 0},
+    Place{"m.lo", &StatePlanes::m, 1},
+    Place{"t.hi", &StatePlanes::t, 0},
+    Place{"t.lo", &StatePlanes::t, 1},
+    Place{"mm.hi", &StatePlanes::mm, 0},
+    Place{"mm.lo", &StatePlanes::mm, 1},
+    Place{"tt.hi", &StatePlanes::tt, 0},
+    Place{"tt.lo", &StatePlanes::tt, 1},
+    Place{"mt.hi", &StatePlanes::mt, 0},
+    Place{"mt.lo", &StatePlanes::mt, 1},
+    Place{"weight.hi", &StatePlanes::weight, 0},
+    Place{"weight.lo", &StatePlanes::weight, 1},
+    Place{"batches", &StatePlanes::batches, 0},
+    Place{"quotient.hi", &StatePlanes::quotient, 0},
+    Place{"quotient.lo", &StatePlanes::quotient, 1},
+    Place{"zero_m.hi", &StatePlanes::zero_m, 0},
+    Place{"zero_m.lo", &StatePlanes::zero_m, 1},
+    Place{"zero_share.hi", &StatePlanes::zero_share, 0},
+    Place{"zero_share.lo", &StatePlanes::zero_share, 1},
+};
+
+bool recorded(const Place& place, const MomentsOptions& o) {
+    const auto p = place.plane;
+    if (p == &StatePlanes::weight || p == &StatePlanes::batches) return o.nonfinite == NonFinite::skip;
+    if (p == &StatePlanes::quotient || p == &StatePlanes::zero_m || p == &StatePlanes::zero_share) return o.ratios;
+    return true;
+}
+
+std::vector<Place> places_of(const MomentsOptions& o) {
+    std::vector<Place> some;
+    std::copy_if(places.begin(), places.end(), std::back_inserter(some), [&](const Place& p) { return recorded(p, o); });
+    return some;
+}
+
+std::string in_group(std::size_t group, const std::string& name) {
+    return group == 0 ? name : "g" + std::to_string(group) + "." + name;
+}
+
+/// Calls each(place, name of the plane, its device memory, byte offset there), group by group.
+template <class Each> void for_planes(const Moments::State& s, std::size_t groups, Each each) {
+    for (std::size_t g = 0; g < groups; ++g)
+        for (const Place& place : places_of(s.options)) {
+            const std::uint64_t parts = place.plane == &StatePlanes::batches ? 1 : 2;
+            const std::uint64_t strides = g * parts + place.part;
+            each(in_group(g, place.name), s.planes.*place.plane, strides * Moments::plane_stride(s.values) * sizeof(float));
+        }
+}
+
+std::vector<std::string> plane_names(const Snapshot& snapshot) {
+    std::vector<std::string> names;
+    const auto some = places_of(moments_options(snapshot));
+    for (std::size_t g = 0; g < snapshot.groups.size(); ++g)
+        for (const Place& place : some) names.push_back(in_group(g, place.name));
+    return names;
+}
+
+void check_words(const Snapshot& s) {
+    const auto names = plane_names(s);
+    if (s.planes.size() != names.size())
+        throw InvalidArgument("snapshot", std::to_string(names.size()) + " planes", std::to_string(s.planes.size()));
+    for (std::size_t i = 0; i < names.size(); ++i) {
+        if (s.planes[i].name != names[i]) throw InvalidArgument("snapshot", "plane " + names[i], s.planes[i].name);
+        if (s.planes[i].words.size() != s.values)
+            throw InvalidArgument("snapshot plane " + names[i], std::to_string(s.values) + " values",
+                                  std::to_string(s.planes[i].words.size()));
+    }
+}
+
+device::clr_two two_floats(const Snapshot::Group& g) {
+    const device::clr_two w{static_cast<float>(g.weight), static_cast<float>(g.weight_low)};
+    const bool exact = static_cast<double>(w.hi) == g.weight && static_cast<double>(w.lo) == g.weight_low;
+    if (!exact || (g.batches == 0) != (g.weight == 0) || !(g.weight >= 0))
+        throw InvalidArgument("snapshot", "a weight that is the sum of two floats, above 0 where there are batches",
+                              std::to_string(g.weight) + " + " + std::to_string(g.weight_low));
+    return w;
+}
+
+void check_alike(const char* call, const Snapshot& a, const Snapshot& b) {
+    if (a.kind != b.kind) throw InvalidArgument(call, "a state of kind " + a.kind, b.kind);
+    if (a.groups.size() != b.groups.size())
+        throw InvalidArgument(call, std::to_string(a.groups.size()) + " groups", std::to_string(b.groups.size()));
+    const auto text = [](const Settings& settings) {
+        std::string all;
+        for (const auto& [name, value] : settings) all += (all.empty() ? "" : " ") + name + "=" + value;
+        return all;
+    };
+    if (a.settings != b.settings) throw InvalidArgument(call, "settings " + text(a.settings), text(b.settings));
+}
+
+}  // namespace
+
+std::uint64_t Snapshot::batches() const {
+    std::uint64_t sum = 0;
+    for (const Group& g : groups) sum += g.batches;
+    return sum;
+}
+
+MomentsOptions moments_options(const Snapshot& snapshot) {
+    if (snapshot.kind != "moments") throw InvalidArgument("snapshot", "kind moments", snapshot.kind);
+    std::map<std::string, std::string> left(snapshot.settings.begin(), snapshot.settings.end());
+    const auto take = [&](const char* name) {
+        const auto found = left.extract(name);
+        if (!found) throw InvalidArgument("snapshot", std::string("the setting ") + name, "none");
+        return found.mapped();
+    };
+    const auto unknown = [](const std::string& name, const std::string& value) {
+        return InvalidArgument("snapshot", "settings of this version", name + "=" + value);
+    };
+    MomentsOptions o;
+    const std::string nonfinite = take("nonfinite"), ratios = take("ratios");
+    if (nonfinites.count(nonfinite) == 0) throw unknown("nonfinite", nonfinite);
+    o.nonfinite = nonfinites.at(nonfinite);
+    if (ratios != "0" && ratios != "1") throw unknown("ratios", ratios);
+    o.ratios = ratios == "1";
+    if (!left.empty()) throw unknown(left.begin()->first, left.begin()->second);
+    return o;
+}
+
+Snapshot Moments::snapshot() const {
+    const State& s = *state_;
+    wait(s.last);
+    Snapshot out{"moments", s.values, settings_of(s.options), {}, negatives(), skipped(), {}};
+    out.groups.push_back({s.batches, s.weight.hi, s.weight.lo});
+    for_planes(s, out.groups.size(), [&](const std::string& name, cl_mem from, std::uint64_t offset) {
+        auto& words = out.planes.emplace_back(Snapshot::Plane{name, std::vector<std::uint32_t>(s.values)}).words;
+        if (s.batches == 0) return;  // its planes hold anything
+        check(clEnqueueReadBuffer(s.engine.queue(), from, CL_TRUE, offset, s.values * sizeof(float), words.data(), 0,
+                                  nullptr, nullptr),
+              "clEnqueueReadBuffer");
+    });
+    return out;
+}
+
+Moments::Moments(const Engine& engine, const Snapshot& snapshot)
+    : Moments(engine, snapshot.values, moments_options(snapshot)) {
+    State& s = *state_;
+    if (snapshot.groups.size() != 1) throw InvalidArgument("snapshot", "1 group", std::to_string(snapshot.groups.size()));
+    check_words(snapshot);
+    const Snapshot::Group& group = snapshot.groups.front();
+    if (group.batches > std::numeric_limits<std::uint32_t>::max())
+        throw InvalidArgument("snapshot", "at most 2^32 - 1 batches", std::to_string(group.batches));
+    s.weight = two_floats(group);
+    s.batches = group.batches;
+    const std::vector<std::byte> padding((plane_stride(s.values) - s.values) * sizeof(float));
+    auto plane = snapshot.planes.begin();
+    const auto write = [&](cl_mem to, std::uint64_t offset, const auto& words) {
+        const auto bytes = std::as_bytes(std::span(words));
+        if (bytes.empty()) return;
+        check(clEnqueueWriteBuffer(engine.queue(), to, CL_TRUE, offset, bytes.size(), bytes.data(), 0, nullptr, nullptr),
+              "clEnqueueWriteBuffer");
+    };
+    for_planes(s, snapshot.groups.size(), [&](const std::string&, cl_mem to, std::uint64_t offset) {
+        write(to, offset, (plane++)->words);
+        write(to, offset + s.values * sizeof(float), padding);
+    });
+    std::array<std::uint64_t, CLR_TALLY_ADD> tallies{};
+    tallies[CLR_TALLY_NEGATIVE] = snapshot.negatives;
+    tallies[CLR_TALLY_SKIPPED] = snapshot.skipped;
+    s.add_rows.write(std::as_bytes(std::span(tallies)));
+}
+
+Snapshot slice(const Snapshot& snapshot, std::uint64_t begin, std::uint64_t count) {
+    if (begin > snapshot.values || count > snapshot.values - begin)
+        throw InvalidArgument("slice", "values of a snapshot that has " + std::to_string(snapshot.values),
+                              std::to_string(begin) + " to " + std::to_string(begin + count));
+    Snapshot out{snapshot.kind, count, snapshot.settings, snapshot.groups, 0, 0, {}};
+    for (const auto& plane : snapshot.planes) {
+        const auto first = plane.words.begin() + static_cast<std::ptrdiff_t>(begin);
+        out.planes.push_back({plane.name, {first, first + static_cast<std::ptrdiff_t>(count)}});
+    }
+    return out;
+}
+
+void append(Snapshot& to, const Snapshot& more) {
+    if (to.values == 0) {
+        to = more;
+        return;
+    }
+    check_alike("append", to, more);
+    if (to.groups != more.groups) throw InvalidArgument("append", "the same batches", "others");
+    if (to.planes.size() != more.planes.size()) throw InvalidArgument("append", "the same planes", "others");
+    for (std::size_t i = 0; i < to.planes.size(); ++i) {
+        const auto& words = more.planes[i].words;
+        if (to.planes[i].name != more.planes[i].name)
+            throw InvalidArgument("append", "plane " + to.planes[i].name, more.planes[i].name);
+        to.planes[i].words.insert(to.planes[i].words.end(), words.begin(), words.end());
+    }
+    to.values += more.values;
+    to.negatives += more.negatives;
+    to.skipped += more.skipped;
+}
+
+Snapshot merge(const Engine& engine, const Snapshot& a, const Snapshot& b) {
+    constexpr std::uint64_t values_at_once = std::uint64_t{1} << 20;
+    if (a.values != b.values) throw InvalidArgument("merge", std::to_string(a.values) + " values", std::to_string(b.values));
+    check_alike("merge", a, b);
+    check_words(a);
+    check_words(b);
+    Snapshot out;
+    for (std::uint64_t begin = 0; begin < a.values; begin += values_at_once) {
+        const std::uint64_t count = std::min(values_at_once, a.values - begin);
+        Moments sum(engine, slice(a, begin, count));
+        sum.merge(Moments(engine, slice(b, begin, count)));
+        const Snapshot part = sum.snapshot();
+        if (begin == 0)
+            out = part;
+        else
+            append(out, part);
+        for (auto& plane : out.planes) plane.words.reserve(a.values);
+    }
+    out.negatives = a.negatives + b.negatives;
+    out.skipped = a.skipped + b.skipped;
+    return out;
+}
+
+}  // namespace clratio
