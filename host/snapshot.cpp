@@ -222,27 +222,27 @@ void append(Snapshot& to, const Snapshot& more) {
     to.skipped += more.skipped;
 }
 
-Snapshot merge(const Engine& engine, const Snapshot& a, const Snapshot& b) {
+void merge(const Engine& engine, Snapshot& into, const Snapshot& more) {
     constexpr std::uint64_t values_at_once = std::uint64_t{1} << 20;
-    if (a.values != b.values) throw InvalidArgument("merge", std::to_string(a.values) + " values", std::to_string(b.values));
-    check_alike("merge", a, b);
-    check_words(a);
-    check_words(b);
-    Snapshot out;
-    for (std::uint64_t begin = 0; begin < a.values; begin += values_at_once) {
-        const std::uint64_t count = std::min(values_at_once, a.values - begin);
-        Moments sum(engine, slice(a, begin, count));
-        sum.merge(Moments(engine, slice(b, begin, count)));
+    if (into.values != more.values)
+        throw InvalidArgument("merge", std::to_string(into.values) + " values", std::to_string(more.values));
+    check_alike("merge", into, more);
+    check_words(into);
+    check_words(more);
+    std::vector<Snapshot::Group> groups;
+    for (std::uint64_t begin = 0; begin < into.values; begin += values_at_once) {
+        const std::uint64_t count = std::min(values_at_once, into.values - begin);
+        Moments sum(engine, slice(into, begin, count));
+        sum.merge(Moments(engine, slice(more, begin, count)));
         const Snapshot part = sum.snapshot();
-        if (begin == 0)
-            out = part;
-        else
-            append(out, part);
-        for (auto& plane : out.planes) plane.words.reserve(a.values);
+        for (std::size_t p = 0; p < part.planes.size(); ++p)
+            std::copy(part.planes[p].words.begin(), part.planes[p].words.end(),
+                      into.planes[p].words.begin() + static_cast<std::ptrdiff_t>(begin));
+        groups = part.groups;
     }
-    out.negatives = a.negatives + b.negatives;
-    out.skipped = a.skipped + b.skipped;
-    return out;
+    into.groups = groups;
+    into.negatives += more.negatives;
+    into.skipped += more.skipped;
 }
 
 }  // namespace clratio

@@ -53,8 +53,8 @@ Snapshot slice(const Snapshot& snapshot, std::uint64_t begin, std::uint64_t coun
 /// Errors: InvalidArgument where kind, settings, groups or planes differ.
 void append(Snapshot& to, const Snapshot& more);
 
-/// As Moments::merge of the two: b's batches after a's. Works in slices, so that the device holds little.
-/// Errors: InvalidArgument where values, kind, settings or planes differ.
-Snapshot merge(const Engine& engine, const Snapshot& a, const Snapshot& b);
+/// As Moments::merge: the batches of `more` after those that are there. Works in slices, so that the device holds little.
+/// Errors: InvalidArgument where values, kind, settings or planes differ, with nothing changed.
+void merge(const Engine& engine, Snapshot& into, const Snapshot& more);
 
 }  // namespace clratio
