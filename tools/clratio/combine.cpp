@@ -1,4 +1,6 @@
 // clratio combine: batches of image pairs to one image.
+#include <algorithm>
+
 #include "combine_run.hpp"
 #include "combine_watch.hpp"
 #include "interrupt.hpp"
@@ -9,11 +11,14 @@ namespace {
 
 using namespace combining;
 
-std::vector<Job> jobs_of(const Options& options, const CombineRun& run) {
+std::vector<Job> jobs_of(const Options& options) {
     std::vector<Job> jobs;
-    for (std::size_t k = 0; k < options.m.size(); ++k)
-        if (const std::uint64_t index = options.first_batch + k; !run.holds(index))
-            jobs.push_back({index, options.m[k], options.t[k]});
+    for (std::size_t k = 0; k < options.m.size(); ++k) jobs.push_back({options.first_batch + k, options.m[k], options.t[k]});
+    return jobs;
+}
+
+std::vector<Job> missing_in(const CombineRun& run, std::vector<Job> jobs) {
+    jobs.erase(std::remove_if(jobs.begin(), jobs.end(), [&](const Job& job) { return run.holds(job.index); }), jobs.end());
     return jobs;
 }
 
@@ -27,7 +32,9 @@ std::vector<Pair> next(PairReader& reader, CombineRun& run) {
     }
 }
 
-int combine_at_once(const Options& options, PairReader& reader, CombineRun& run) {
+int combine_without_state(const Options& options) {
+    PairReader reader(jobs_of(options), options.layer);  // before the device is opened, which takes as long
+    CombineRun run(options);
     auto pairs = next(reader, run);
     if (reader.done()) {
         run.add_and_read_out(pairs);
@@ -44,8 +51,10 @@ int combine_at_once(const Options& options, PairReader& reader, CombineRun& run)
     return run.report(reader.seconds());
 }
 
-int combine_into_state(const Options& options, PairReader& reader, CombineRun& run) {
+int combine_into_state(const Options& options) {
     const Interrupt interrupt;
+    CombineRun run(options);
+    PairReader reader(missing_in(run, jobs_of(options)), options.layer);
     ProgressLine line;
     while (!reader.done() && !interrupt.asked()) {
         run.add(next(reader, run));
@@ -58,15 +67,10 @@ int combine_into_state(const Options& options, PairReader& reader, CombineRun& r
     return run.report(reader.seconds());
 }
 
-int combine_list(const Options& options) {
-    CombineRun run(options);
-    PairReader reader(jobs_of(options, run), options.layer);
-    return options.state.empty() ? combine_at_once(options, reader, run) : combine_into_state(options, reader, run);
-}
-
 int combine(const Options& options) {
     check(options);
-    return options.watch.empty() ? combine_list(options) : combine_watch(options);
+    if (!options.watch.empty()) return combine_watch(options);
+    return options.state.empty() ? combine_without_state(options) : combine_into_state(options);
 }
 
 }  // namespace

@@ -26,7 +26,7 @@ constexpr auto add_commands = {tool::add_devices, tool::add_combine, tool::add_m
                                tool::add_law,     tool::add_errors,  tool::add_figures, tool::add_audit};
 
 int fail(const std::string& what, int code) {
-    fmt::print(stderr, "clratio: {}\n", what);
+    std::fputs(("clratio: " + what + "\n").c_str(), stderr);  // fmt::print would throw where nothing can be written
     return code;
 }
 
