@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <limits>
 #include <map>
 
@@ -15,11 +16,53 @@ using Settings = std::vector<std::pair<std::string, std::string>>;
 const std::map<std::string, NonFinite> nonfinites{
     {"skip", NonFinite::skip}, {"propagate", NonFinite::propagate}, {"fail", NonFinite::fail}};
 
-Settings settings_of(const MomentsOptions& o) {
-    const auto same = [&](const auto& entry) { return entry.second == o.nonfinite; };
-    return {{"nonfinite", std::find_if(nonfinites.begin(), nonfinites.end(), same)->first},
-            {"ratios", o.ratios ? "1" : "0"}};
+const std::map<std::string, Weights> weights{{"samples", Weights::samples}, {"reliability", Weights::reliability}};
+
+const std::map<std::string, bool> yes_or_no{{"0", false}, {"1", true}};
+
+template <class Map, class Value> std::string name_in(const Map& map, const Value& value) {
+    return std::find_if(map.begin(), map.end(), [&](const auto& entry) { return entry.second == value; })->first;
 }
+
+Settings settings_of(const MomentsOptions& o) {
+    return {{"nonfinite", name_in(nonfinites, o.nonfinite)},
+            {"ratios", name_in(yes_or_no, o.ratios)},
+            {"groups", std::to_string(o.groups)},
+            {"weights", name_in(weights, o.weights)}};
+}
+
+/// Settings taken one by one, until none is left.
+class SettingsReader {
+public:
+    explicit SettingsReader(const Settings& settings) : left_(settings.begin(), settings.end()) {}
+    template <class Map> auto take(const char* name, const Map& map) {
+        const std::string value = take(name);
+        const auto found = map.find(value);
+        if (found == map.end()) throw unknown(name, value);
+        return found->second;
+    }
+    std::uint32_t take_number(const char* name) {
+        const std::string value = take(name);
+        std::uint32_t number = 0;
+        const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), number);
+        if (error != std::errc() || end != value.data() + value.size()) throw unknown(name, value);
+        return number;
+    }
+    void require_none_left() const {
+        if (!left_.empty()) throw unknown(left_.begin()->first, left_.begin()->second);
+    }
+
+private:
+    std::string take(const char* name) {
+        const auto found = left_.extract(name);
+        if (!found) throw InvalidArgument("snapshot", std::string("the setting ") + name, "none");
+        return found.mapped();
+    }
+    static InvalidArgument unknown(const std::string& name, const std::string& value) {
+        return {"snapshot", "settings of this version", name + "=" + value};
+    }
+    std::map<std::string, std::string> left_;
+};
 
 // ---- planes: words of a snapshot, and where they lie on the device
 
@@ -43,6 +86,8 @@ constexpr std::array places{
     Place{"weight.hi", &StatePlanes::weight, 0},
     Place{"weight.lo", &StatePlanes::weight, 1},
     Place{"batches", &StatePlanes::batches, 0},
+    Place{"weight2.hi", &StatePlanes::weight2, 0},
+    Place{"weight2.lo", &StatePlanes::weight2, 1},
     Place{"quotient.hi", &StatePlanes::quotient, 0},
     Place{"quotient.lo", &StatePlanes::quotient, 1},
     Place{"zero_m.hi", &StatePlanes::zero_m, 0},
@@ -54,6 +99,7 @@ constexpr std::array places{
 bool recorded(const Place& place, const MomentsOptions& o) {
     const auto p = place.plane;
     if (p == &StatePlanes::weight || p == &StatePlanes::batches) return o.nonfinite == NonFinite::skip;
+    if (p == &StatePlanes::weight2) return o.nonfinite == NonFinite::skip && o.weights == Weights::reliability;
     if (p == &StatePlanes::quotient || p == &StatePlanes::zero_m || p == &StatePlanes::zero_share) return o.ratios;
     return true;
 }
@@ -68,13 +114,14 @@ std::string in_group(std::size_t group, const std::string& name) {
     return group == 0 ? name : "g" + std::to_string(group) + "." + name;
 }
 
-/// Calls each(place, name of the plane, its device memory, byte offset there), group by group.
-template <class Each> void for_planes(const Moments::State& s, std::size_t groups, Each each) {
-    for (std::size_t g = 0; g < groups; ++g)
+/// Calls each(group, name of the plane, its device memory, byte offset there), group by group.
+template <class Each> void for_planes(const Moments::State& s, Each each) {
+    for (std::size_t g = 0; g < s.groups.size(); ++g)
         for (const Place& place : places_of(s.options)) {
             const std::uint64_t parts = place.plane == &StatePlanes::batches ? 1 : 2;
             const std::uint64_t strides = g * parts + place.part;
-            each(in_group(g, place.name), s.planes.*place.plane, strides * Moments::plane_stride(s.values) * sizeof(float));
+            each(g, in_group(g, place.name), s.planes.*place.plane,
+                 strides * Moments::plane_stride(s.values) * sizeof(float));
         }
 }
 
@@ -98,13 +145,18 @@ void check_words(const Snapshot& s) {
     }
 }
 
-device::clr_two two_floats(const Snapshot::Group& g) {
-    const device::clr_two w{static_cast<float>(g.weight), static_cast<float>(g.weight_low)};
-    const bool exact = static_cast<double>(w.hi) == g.weight && static_cast<double>(w.lo) == g.weight_low;
-    if (!exact || (g.batches == 0) != (g.weight == 0) || !(g.weight >= 0))
+device::clr_two two_floats(double high, double low, std::uint64_t batches) {
+    const device::clr_two w{static_cast<float>(high), static_cast<float>(low)};
+    const bool exact = static_cast<double>(w.hi) == high && static_cast<double>(w.lo) == low;
+    if (!exact || (batches == 0) != (high == 0) || !(high >= 0))
         throw InvalidArgument("snapshot", "a weight that is the sum of two floats, above 0 where there are batches",
-                              std::to_string(g.weight) + " + " + std::to_string(g.weight_low));
+                              std::to_string(high) + " + " + std::to_string(low));
     return w;
+}
+
+Moments::State::Group group_of(const Snapshot::Group& g) {
+    check_room(0, g.batches);
+    return {g.batches, two_floats(g.weight, g.weight_low, g.batches), two_floats(g.weight2, g.weight2_low, g.batches)};
 }
 
 void check_alike(const char* call, const Snapshot& a, const Snapshot& b) {
@@ -129,33 +181,21 @@ std::uint64_t Snapshot::batches() const {
 
 MomentsOptions moments_options(const Snapshot& snapshot) {
     if (snapshot.kind != "moments") throw InvalidArgument("snapshot", "kind moments", snapshot.kind);
-    std::map<std::string, std::string> left(snapshot.settings.begin(), snapshot.settings.end());
-    const auto take = [&](const char* name) {
-        const auto found = left.extract(name);
-        if (!found) throw InvalidArgument("snapshot", std::string("the setting ") + name, "none");
-        return found.mapped();
-    };
-    const auto unknown = [](const std::string& name, const std::string& value) {
-        return InvalidArgument("snapshot", "settings of this version", name + "=" + value);
-    };
-    MomentsOptions o;
-    const std::string nonfinite = take("nonfinite"), ratios = take("ratios");
-    if (nonfinites.count(nonfinite) == 0) throw unknown("nonfinite", nonfinite);
-    o.nonfinite = nonfinites.at(nonfinite);
-    if (ratios != "0" && ratios != "1") throw unknown("ratios", ratios);
-    o.ratios = ratios == "1";
-    if (!left.empty()) throw unknown(left.begin()->first, left.begin()->second);
-    return o;
+    SettingsReader settings(snapshot.settings);
+    const MomentsOptions options{settings.take("nonfinite", nonfinites), settings.take("ratios", yes_or_no),
+                                 settings.take_number("groups"), settings.take("weights", weights)};
+    settings.require_none_left();
+    return options;
 }
 
 Snapshot Moments::snapshot() const {
     const State& s = *state_;
     wait(s.last);
     Snapshot out{"moments", s.values, settings_of(s.options), {}, negatives(), skipped(), {}};
-    out.groups.push_back({s.batches, s.weight.hi, s.weight.lo});
-    for_planes(s, out.groups.size(), [&](const std::string& name, cl_mem from, std::uint64_t offset) {
+    for (const auto& g : s.groups) out.groups.push_back({g.batches, g.weight.hi, g.weight.lo, g.weight2.hi, g.weight2.lo});
+    for_planes(s, [&](std::size_t group, const std::string& name, cl_mem from, std::uint64_t offset) {
         auto& words = out.planes.emplace_back(Snapshot::Plane{name, std::vector<std::uint32_t>(s.values)}).words;
-        if (s.batches == 0) return;  // its planes hold anything
+        if (s.groups[group].batches == 0) return;  // its planes hold anything
         check(clEnqueueReadBuffer(s.engine.queue(), from, CL_TRUE, offset, s.values * sizeof(float), words.data(), 0,
                                   nullptr, nullptr),
               "clEnqueueReadBuffer");
@@ -166,13 +206,12 @@ Snapshot Moments::snapshot() const {
 Moments::Moments(const Engine& engine, const Snapshot& snapshot)
     : Moments(engine, snapshot.values, moments_options(snapshot)) {
     State& s = *state_;
-    if (snapshot.groups.size() != 1) throw InvalidArgument("snapshot", "1 group", std::to_string(snapshot.groups.size()));
+    if (snapshot.groups.size() != s.groups.size())
+        throw InvalidArgument("snapshot", std::to_string(s.groups.size()) + " groups",
+                              std::to_string(snapshot.groups.size()));
     check_words(snapshot);
-    const Snapshot::Group& group = snapshot.groups.front();
-    if (group.batches > std::numeric_limits<std::uint32_t>::max())
-        throw InvalidArgument("snapshot", "at most 2^32 - 1 batches", std::to_string(group.batches));
-    s.weight = two_floats(group);
-    s.batches = group.batches;
+    check_room(0, snapshot.batches());
+    std::transform(snapshot.groups.begin(), snapshot.groups.end(), s.groups.begin(), group_of);
     const std::vector<std::byte> padding((plane_stride(s.values) - s.values) * sizeof(float));
     auto plane = snapshot.planes.begin();
     const auto write = [&](cl_mem to, std::uint64_t offset, const auto& words) {
@@ -181,7 +220,7 @@ Moments::Moments(const Engine& engine, const Snapshot& snapshot)
         check(clEnqueueWriteBuffer(engine.queue(), to, CL_TRUE, offset, bytes.size(), bytes.data(), 0, nullptr, nullptr),
               "clEnqueueWriteBuffer");
     };
-    for_planes(s, snapshot.groups.size(), [&](const std::string&, cl_mem to, std::uint64_t offset) {
+    for_planes(s, [&](std::size_t, const std::string&, cl_mem to, std::uint64_t offset) {
         write(to, offset, (plane++)->words);
         write(to, offset + s.values * sizeof(float), padding);
     });

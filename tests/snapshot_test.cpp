@@ -22,6 +22,8 @@ std::vector<MomentsOptions> all_options() {
     std::vector<MomentsOptions> all;
     for (const NonFinite n : {NonFinite::skip, NonFinite::propagate, NonFinite::fail})
         for (const bool ratios : {false, true}) all.push_back({n, ratios});
+    for (const NonFinite n : {NonFinite::skip, NonFinite::propagate}) all.push_back({n, false, 3, Weights::reliability});
+    all.push_back({NonFinite::skip, true, 16});
     return all;
 }
 
@@ -94,6 +96,18 @@ TEST(Snapshot, holds_what_the_planes_hold) {
     EXPECT_EQ(s.planes[12].words, sum.bits(&StatePlanes::batches));
 }
 
+TEST(Snapshot, groups_have_planes_of_their_own) {
+    const Engine engine;
+    const Moments sum = made(engine, {.groups = 3}, 1, 5);
+    const Snapshot s = sum.snapshot();
+    ASSERT_EQ(s.groups.size(), 3u);
+    EXPECT_EQ(s.groups[0].batches, 2u);
+    EXPECT_EQ(s.groups[2].batches, 1u);
+    EXPECT_EQ(s.planes[13].name, "g1.m.hi");
+    const auto all = sum.bits(&StatePlanes::m);
+    EXPECT_TRUE(std::equal(all.begin() + 2 * values, all.begin() + 3 * values, s.planes[13].words.begin()));
+}
+
 TEST(Snapshot, slices_append_to_the_whole) {
     const Engine engine;
     const Snapshot whole = made(engine, {}, 1, 3).snapshot();
@@ -132,11 +146,14 @@ TEST(Snapshot, misfits_are_refused_by_name) {
         refused([&] { Moments(engine, bad); }, what);
     };
     refuse([](auto& s) { s.kind = "fixed"; }, "expected kind moments, got fixed");
-    refuse([](auto& s) { s.settings.pop_back(); }, "expected the setting ratios, got none");
+    refuse([](auto& s) { s.settings.pop_back(); }, "expected the setting weights, got none");
     refuse([](auto& s) { s.settings[1].second = "2"; }, "got ratios=2");
     refuse([](auto& s) { s.settings[0].second = "maybe"; }, "got nonfinite=maybe");
     refuse([](auto& s) { s.settings.push_back({"colour", "red"}); }, "got colour=red");
-    refuse([](auto& s) { s.groups.clear(); }, "1 group");
+    refuse([](auto& s) { s.settings[2].second = "x"; }, "got groups=x");
+    refuse([](auto& s) { s.settings[2].second = "17"; }, "groups: expected 1 to 16, got 17");
+    refuse([](auto& s) { s.groups.clear(); }, "1 groups, got 0");
+    refuse([](auto& s) { s.groups[0].weight2_low = .1; }, "weight");
     refuse([](auto& s) { s.planes.pop_back(); }, "13 planes, got 12");
     refuse([](auto& s) { s.planes[3].name = "x"; }, "plane t.lo, got x");
     refuse([](auto& s) { s.planes[3].words.pop_back(); }, "plane t.lo: expected 1003 values, got 1002");
@@ -157,5 +174,5 @@ TEST(Snapshot, misfits_are_refused_by_name) {
     refuse_merge([](auto& s) { s.values = 7; }, "merge: expected 1003 values, got 7");
     refuse_merge([](auto& s) { s.kind = "fixed"; }, "merge: expected a state of kind moments, got fixed");
     refuse_merge([](auto& s) { s.settings[0].second = "propagate"; },
-                 "merge: expected settings nonfinite=skip ratios=0, got nonfinite=propagate ratios=0");
+                 "merge: expected settings nonfinite=skip ratios=0 groups=1 weights=samples, got nonfinite=propagate");
 }

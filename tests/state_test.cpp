@@ -77,7 +77,8 @@ TEST(State, ranges_that_overlap_or_are_empty_are_refused) {
 TEST(State, there_and_back_has_the_same_bits_and_the_same_bytes) {
     const Scratch scratch;
     const Engine engine;
-    for (const auto options : {MomentsOptions{}, MomentsOptions{NonFinite::propagate, true}}) {
+    for (const auto options : {MomentsOptions{}, MomentsOptions{NonFinite::propagate, true},
+                               MomentsOptions{NonFinite::skip, false, 2, Weights::reliability}}) {
         const StateFile s = state_of(engine, 3, 4, options);
         write_state(scratch / "a.exr", s);
         const StateFile back = read_state(scratch / "a.exr");
@@ -127,6 +128,9 @@ TEST(State, is_an_image_that_others_can_open) {
 TEST(State, what_does_not_fit_together_is_not_written) {
     const Scratch scratch;
     const Engine engine;
+    StateFile grouped = state_of(engine, 0, 3, {.groups = 2});
+    grouped.ranges = BatchRanges::parse("[1,4)");
+    refused([&] { write_state(scratch / "a.exr", grouped); }, "2 batches in group 0, got 1 in [1,4)");
     const StateFile good = state_of(engine, 0, 3);
     const auto refuse = [&](auto change, const std::string& what) {
         StateFile bad = good;
@@ -452,7 +456,8 @@ TEST(State, parts_that_do_not_fit_are_refused_with_both_names) {
         return s;
     };
     refuse(state_of(engine, 3, 4), "both hold batches [3,4)");
-    refuse(state_of(engine, 4, 4, {NonFinite::propagate}), "nonfinite=skip ratios=0 and nonfinite=propagate ratios=0");
+    refuse(state_of(engine, 4, 4, {NonFinite::propagate}),
+           "nonfinite=skip ratios=0 groups=1 weights=samples and nonfinite=propagate");
     refuse(changed([](auto& s) { s.settings[0].second = "beauty"; }), "layer.m=shadow layer.t= and layer.m=beauty");
     refuse(changed([](auto& s) { s.shape.channels = {"X", "Y", "Z"}; }), "channels: R,G,B and X,Y,Z");
     refuse(changed([](auto& s) { s.shape.data_window = {0, 0, 4, 2}; }), "data window: (-2,7)-(2,9) and (0,0)-(4,2)");

@@ -26,7 +26,7 @@ struct Snapshot {
     struct Group {
         std::uint64_t batches = 0;
         double weight = 0, weight_low = 0;
-        double weight2 = 0, weight2_low = 0;  ///< of the squared weights, where the state records them
+        double weight2 = 0, weight2_low = 0;  ///< the same of the squared weights
         bool operator==(const Group&) const = default;
     };
     std::vector<Group> groups;

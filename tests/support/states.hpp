@@ -31,7 +31,9 @@ inline Image state_shape() {
 inline void add_batch(Moments& sum, std::uint64_t k) {
     Samples draw(k + 1);
     const auto m = floats(sum.size(), [&] { return k == 1 && draw.uniform() < .1 ? std::nan("") : draw.normal(); });
-    sum.add(m, floats(sum.size(), [&] { return draw.uniform(); }));
+    const auto t = floats(sum.size(), [&] { return draw.uniform(); });
+    const HostBatch batch{m, t, 1, k};
+    sum.add(std::span(&batch, 1));
 }
 
 /// The state of batches [first, first + batches).

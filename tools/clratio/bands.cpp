@@ -27,6 +27,8 @@ void append(Combined& to, const Combined& more, bool flag_image) {
     to.flags.no_data += more.flags.no_data;
     to.flags.no_error_bar += more.flags.no_error_bar;
     to.flags.nonfinite += more.flags.nonfinite;
+    to.flags.fell_back += more.flags.fell_back;
+    to.flags.no_spread += more.flags.no_spread;
     to.flags.any += more.flags.any;
 }
 
@@ -68,7 +70,7 @@ clratio::Snapshot Bands::snapshot() const {
 std::vector<HostBatch> Bands::slices(std::uint64_t band, std::span<const HostBatch> batches) const {
     std::vector<HostBatch> out;
     for (const auto& b : batches)
-        out.push_back({b.m.subspan(begin(band), size(band)), b.t.subspan(begin(band), size(band)), b.weight});
+        out.push_back({b.m.subspan(begin(band), size(band)), b.t.subspan(begin(band), size(band)), b.weight, b.index});
     return out;
 }
 

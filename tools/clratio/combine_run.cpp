@@ -81,7 +81,7 @@ std::vector<clratio::HostBatch> CombineRun::accept(const std::vector<Pair>& pair
             require_finite(pair.m);
             require_finite(pair.t);
         }
-        batches.push_back({pair.m, pair.t});
+        batches.push_back({pair.m, pair.t, 1, pair.index});
     }
     return batches;
 }
