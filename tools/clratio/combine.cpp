@@ -22,26 +22,16 @@ std::vector<Job> missing_in(const CombineRun& run, std::vector<Job> jobs) {
     return jobs;
 }
 
-/// The next pairs; before an error goes on, what was added is saved.
-std::vector<Pair> next(PairReader& reader, CombineRun& run) {
-    try {
-        return reader.next();
-    } catch (...) {
-        run.save();
-        throw;
-    }
-}
-
 int combine_without_state(const Options& options) {
     PairReader reader(jobs_of(options), options.layer);  // before the device is opened, which takes as long
     CombineRun run(options);
-    auto pairs = next(reader, run);
+    auto pairs = reader.next();
     if (reader.done()) {
         run.add_and_read_out(pairs);
         return run.report(reader.seconds());
     }
     ProgressLine line;
-    for (;; pairs = next(reader, run)) {
+    for (;; pairs = reader.next()) {
         run.add(pairs);
         if (reader.done()) break;
         line.show(fmt::format("{} of {} batches", run.batches(), options.m.size()));
@@ -56,11 +46,12 @@ int combine_into_state(const Options& options) {
     CombineRun run(options);
     PairReader reader(missing_in(run, jobs_of(options)), options.layer);
     ProgressLine line;
-    while (!reader.done() && !interrupt.asked()) {
-        run.add(next(reader, run));
-        line.show(fmt::format("{} batches in {}", run.batches(), options.state));
-    }
-    run.save();
+    run.saved_at_the_end([&] {
+        while (!reader.done() && !interrupt.asked()) {
+            run.add(reader.next());
+            line.show(fmt::format("{} batches in {}", run.batches(), options.state));
+        }
+    });
     line.clear();
     if (interrupt.asked()) throw Stopped(run.how_to_go_on());
     if (!options.output.empty()) run.read_out();

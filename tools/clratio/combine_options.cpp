@@ -35,16 +35,32 @@ from the first file of --m. The output is float, ZIP, with the windows and attri
 --stderr: the standard error by the delta method; +inf with one batch. Without it a missing error bar is no flag that
 --fail-on-flag looks at.
 
---json prints batches, pixels, channels, estimator, device, output, flags (how many values carry each; any: at least one),
-negative_inputs, seconds (decode, summed over the reading threads; device; encode) and, with --reference, rmse, bias,
-rmse_mean and bias_mean (of the plain mean), over the values that are finite in both files.
+--state FILE keeps the sums, so that more batches can be added later or elsewhere: nothing is read twice, no batch counts
+twice. A batch's index is --first-batch (0) plus its place in the list. With --resume the run goes on with FILE if it is
+there, and skips listed batches that it holds: the same command again finishes what was stopped. FILE is replaced whole,
+every --checkpoint seconds and at the end; Ctrl-C and SIGTERM save and exit with 130, a kill loses what came after the last
+checkpoint, a full disk loses nothing. Without --output batches are added, no more; without --m the state is read out.
+Machines of a farm keep a state each, with their own --first-batch, and clratio merge joins them.
 
-Exit codes: 0 done, 1 failed, 2 usage, 3 done but values were flagged and --fail-on-flag was given.
+--watch DIR adds what a renderer writes to DIR. --m and --t are patterns there, "m_*.exr" "t_*.exr" or "b_*.exr:shadow"
+"b_*.exr:light" (quoted!), where * is a number, the batch's index: the same after every restart. A pair counts when both
+files have stood still for --settle seconds and open completely. The outputs are written anew after each launch of batches.
+It ends on --until-batches N (in the sums), on --until-error E (the root mean square of the standard error, over the values
+that have one, in units of m), or on Ctrl-C.
+
+--json prints batches, pixels, channels, estimator, device, output, flags (how many values carry each; any: at least one),
+negative_inputs, seconds (decode, summed over the reading threads; device; encode), with --state also state (file, ranges,
+held: batches it began with, added: batches since) and with --reference rmse, bias, rmse_mean and bias_mean (of the plain
+mean), over the values that are finite in both files.
+
+Exit codes: 0 done, 1 failed, 2 usage, 3 done but values were flagged and --fail-on-flag was given, 130 stopped.
 
 Examples:
   clratio combine --m m_*.exr --t t_*.exr --tau tau.exr -o out.exr
   clratio combine --m a_m.exr b_m.exr --t a_t.exr b_t.exr --tau 1 -o out.exr --layer ViewLayer.Combined
-  clratio combine --m m_*.exr --t t_*.exr --tau t_ref.exr -o out.exr --reference m_ref.exr --stderr error.exr --json)";
+  clratio combine --m m_*.exr --t t_*.exr --tau t_ref.exr -o out.exr --reference m_ref.exr --stderr error.exr --json
+  clratio combine --m m_*.exr --t t_*.exr --tau tau.exr -o out.exr --state sums.exr --resume
+  clratio combine --watch renders --m "m_*.exr" --t "t_*.exr" --tau tau.exr -o out.exr --state sums.exr --resume)";
 
 std::vector<std::string> outputs(const Options& options) {
     std::vector<std::string> files{options.output, options.standard_error, options.flags, options.state};
@@ -114,8 +130,8 @@ void add_options(CLI::App& app, const std::shared_ptr<Options>& o) {
         for (const auto& entry : map) words.push_back(entry.first);
         return command->add_option(name, value, help)->type_name("WORD")->check(CLI::IsMember(words))->capture_default_str();
     };
-    command->add_option("--m", o->m, "Batches of m, one file each")->type_name("FILE");
-    command->add_option("--t", o->t, "Batches of t, in the same order")->type_name("FILE");
+    command->add_option("--m", o->m, "Batches of m, one file each; with --watch a pattern")->type_name("FILE");
+    command->add_option("--t", o->t, "Batches of t, in the same order; with --watch a pattern")->type_name("FILE");
     command->add_option("--tau", o->tau, "The mean of t: a number, one for each channel, or files, which are averaged")
         ->type_name("FILE|NUMBER");
     command->add_option("-o,--output", o->output, "The combined image")->type_name("OUT.exr");

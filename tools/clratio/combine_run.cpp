@@ -87,15 +87,11 @@ std::vector<clratio::HostBatch> CombineRun::accept(const std::vector<Pair>& pair
 }
 
 void CombineRun::add(const std::vector<Pair>& pairs) {
-    std::vector<clratio::HostBatch> batches;
-    try {
-        batches = accept(pairs);
-    } catch (...) {
-        save();
-        throw;
-    }
+    const auto batches = accept(pairs);
     if (!bands_) bands_.emplace(engine_, pairs.front().m.size(), keeper_.shape().channels.size(), moments_);
+    whole_ = false;
     timed(report_.seconds.device, [&] { bands_->add(batches); });
+    whole_ = true;
     for (const Pair& pair : pairs) keeper_.added(pair);
     if (keeper_.due()) save();
 }
@@ -108,7 +104,7 @@ void CombineRun::add_and_read_out(const std::vector<Pair>& pairs) {
 }
 
 void CombineRun::save() {
-    if (bands_) timed(report_.seconds.encode, [&] { keeper_.save(*bands_); });
+    if (bands_ && whole_) timed(report_.seconds.encode, [&] { keeper_.save(*bands_); });
 }
 
 std::string CombineRun::how_to_go_on() const {

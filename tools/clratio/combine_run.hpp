@@ -18,8 +18,18 @@ public:
     void add(const std::vector<Pair>& pairs);
     /// Where these are all there will ever be, and no state is kept: adds and reads out in one pass.
     void add_and_read_out(const std::vector<Pair>& pairs);
-    /// Saves what was added since the last time.
+    /// Saves what was added since the last time; nothing where the device failed in the middle of adding.
     void save();
+    /// save() after `work`, however it ends.
+    template <class Work> void saved_at_the_end(Work work) {
+        try {
+            work();
+        } catch (...) {
+            save();
+            throw;
+        }
+        save();
+    }
     std::string how_to_go_on() const;
 
     /// Reads out what was added and writes the images.
@@ -43,6 +53,7 @@ private:
     std::optional<Bands> bands_;
     clratio::MomentsOptions moments_;
     clratio::Image reference_;
+    bool whole_ = true;  ///< all bands hold the same batches
     double rms_error_ = 0;
 };
 

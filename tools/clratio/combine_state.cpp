@@ -55,6 +55,7 @@ void StateKeeper::fit(const Pair& pair) {
         state_.settings = settings;
     }
     clratio::require_same_shape(state_.shape, pair.m);
+    clratio::require_same_shape(pair.m, pair.t);
     if (!options_.state.empty() && settings != state_.settings)
         throw clratio::IoError(pair.m.path, pair.m.layer,
                                text_of(settings) + ", but " + options_.state + " holds " + text_of(state_.settings));

@@ -18,17 +18,13 @@ public:
           folder_(options.watch, Pattern("--m", options.m.front()), Pattern("--t", options.t.front()), options.settle) {}
 
     int until_done() {
-        if (run_.batches() > 0) refresh();
-        while (!target_met()) {
-            if (interrupt_.asked()) {
-                run_.save();
-                line_.clear();
-                throw Stopped(run_.how_to_go_on());
-            }
-            if (!add_what_is_new()) std::this_thread::sleep_for(pause_);
-        }
-        run_.save();
+        run_.saved_at_the_end([&] {
+            if (run_.batches() > 0) refresh();
+            while (!target_met() && !interrupt_.asked())
+                if (!add_what_is_new()) std::this_thread::sleep_for(pause_);
+        });
         line_.clear();
+        if (!target_met()) throw Stopped(run_.how_to_go_on());
         return run_.report(seconds_);
     }
 
@@ -63,7 +59,6 @@ private:
         const auto start = std::chrono::steady_clock::now();
         try {
             Pair pair{index, clratio::read_image(job.m, options_.layer), clratio::read_image(job.t, options_.layer)};
-            clratio::require_same_shape(pair.m, pair.t);
             seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
             return pair;
         } catch (const clratio::IoError& e) {

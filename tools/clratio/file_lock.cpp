@@ -7,6 +7,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 
 #include "clratio/exception.hpp"
 
@@ -23,7 +24,7 @@ bool still_there(int descriptor, const std::string& name) {
 
 }  // namespace
 
-FileLock::FileLock(const std::string& file) : name_(file + ".lock") {
+FileLock::FileLock(const std::string& file) : name_(std::filesystem::weakly_canonical(file).string() + ".lock") {
     for (;;) {
         descriptor_ = open(name_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
         if (descriptor_ < 0) throw clratio::IoError(file, "", "cannot be locked: " + std::string(std::strerror(errno)));
