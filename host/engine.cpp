@@ -8,8 +8,8 @@
 #include <cstring>
 
 #include "clratio/device/portable.h"
+#include "engine_state.hpp"
 #include "launch.hpp"
-#include "state.hpp"
 
 namespace clratio {
 namespace {

@@ -4,6 +4,7 @@
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -27,5 +28,21 @@ inline void add_slices(Imf::FrameBuffer& frame, const std::vector<std::string>& 
     for (std::size_t c = 0; c < channels.size(); ++c)
         frame.insert(channels[c], Imf::Slice::Make(type, first + 4 * c, window, pixel, row));
 }
+
+/// Adds the attributes that describe the picture, not the layout of the file it was read from.
+void carry_metadata(const Image::Metadata& from, Imf::Header& to);
+
+/// Where a file written as `path` goes: links are followed. Throws std::runtime_error where what stands there is no file.
+std::filesystem::path output_target(const std::filesystem::path& path);
+
+/// Throws InvalidArgument unless the image has channels of different names and at least one pixel.
+void require_channels(const Image& image);
+
+/// A damaged header can ask for any amount of memory. No compression of OpenEXR packs values more tightly than this; throws
+/// std::runtime_error.
+void require_plausible_size(const Imf::Header& header, std::uint64_t file_bytes);
+
+/// Throws std::runtime_error unless this is a file that starts as OpenEXR files do.
+void require_exr(const std::string& path);
 
 }  // namespace clratio

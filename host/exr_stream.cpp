@@ -1,8 +1,11 @@
 #include "exr_stream.hpp"
 
 #include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <system_error>
@@ -11,13 +14,44 @@
 namespace clratio {
 namespace {
 
-std::filesystem::path beside(const std::filesystem::path& target) {
+namespace fs = std::filesystem;
+
+std::string front(const fs::path& target) { return "." + target.filename().string() + "."; }
+constexpr std::string_view back = ".tmp";
+
+fs::path beside(const fs::path& target) {
     static std::atomic<unsigned> count{0};
     const std::string mark = std::to_string(getpid()) + "-" + std::to_string(count++);
-    return target.parent_path() / ("." + target.filename().string() + "." + mark + ".tmp");
+    return target.parent_path() / (front(target) + mark + std::string(back));
 }
 
-void sync_folder(const std::filesystem::path& folder) {
+bool is_temporary(const std::string& name, const fs::path& target) {
+    const std::string before = front(target);
+    if (name.size() <= before.size() + back.size() || !name.starts_with(before) || !name.ends_with(back)) return false;
+    const std::string mark = name.substr(before.size(), name.size() - before.size() - back.size());
+    return mark.find_first_not_of("0123456789-") == std::string::npos;
+}
+
+// Writers hold a lock on their temporary file, which the system takes back when they die: what can be locked is nobody's.
+void remove_left_behind(const fs::path& target) {
+    std::error_code none;
+    const fs::path folder = target.has_parent_path() ? target.parent_path() : ".";
+    for (const auto& entry : fs::directory_iterator(folder, none)) {
+        if (!is_temporary(entry.path().filename().string(), target)) continue;
+        const int file = open(entry.path().c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
+        if (file < 0) continue;
+        if (flock(file, LOCK_EX | LOCK_NB) == 0) unlink(entry.path().c_str());
+        close(file);
+    }
+}
+
+/// Did another process take the new file for one left behind, before it was locked?
+bool lost(int file) {
+    struct stat now {};
+    return (flock(file, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) || fstat(file, &now) != 0 || now.st_nlink == 0;
+}
+
+void sync_folder(const fs::path& folder) {
     const int file = open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (file < 0) throw std::system_error(errno, std::system_category());
     const int code = fsync(file) != 0 && errno != EINVAL ? errno : 0;  // EINVAL: a file system without such a thing
@@ -27,16 +61,22 @@ void sync_folder(const std::filesystem::path& folder) {
 
 }  // namespace
 
-FileOutput::FileOutput(const std::filesystem::path& target)
-    : Imf::OStream(target.c_str()), target_(target), temporary_(beside(target)) {
-    file_ = open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    if (file_ < 0) throw std::system_error(errno, std::system_category());
+FileOutput::FileOutput(const fs::path& target) : Imf::OStream(target.c_str()), target_(target) {
+    remove_left_behind(target);
+    do {
+        if (file_ >= 0) close(file_);
+        temporary_ = beside(target);
+        file_ = open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+        if (file_ < 0) throw std::system_error(errno, std::system_category());
+    } while (lost(file_));
     exists_ = true;
+    lock_ = fcntl(file_, F_DUPFD_CLOEXEC, 0);
 }
 
 FileOutput::~FileOutput() {
     if (file_ >= 0) close(file_);
     if (exists_) unlink(temporary_.c_str());
+    if (lock_ >= 0) close(lock_);
 }
 
 void FileOutput::fail(int code) {

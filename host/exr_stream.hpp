@@ -9,8 +9,8 @@
 
 namespace clratio {
 
-/// A new file beside `target` under a passing name. Every write is checked; the first failure is remembered, because
-/// OpenEXR 3.1 writes its offset table in a destructor that swallows it.
+/// A new file beside `target` under a passing name; what killed processes left there is removed. Every write is checked; the
+/// first failure is remembered, because OpenEXR 3.1 writes its offset table in a destructor that swallows it.
 class FileOutput : public Imf::OStream {
 public:
     explicit FileOutput(const std::filesystem::path& target);
@@ -31,6 +31,7 @@ private:
 
     std::filesystem::path target_, temporary_;
     int file_ = -1;
+    int lock_ = -1;    ///< the same file, which stays locked when file_ is closed
     int failure_ = 0;  ///< errno of the first failure
     bool exists_ = false;
     std::uint64_t position_ = 0;

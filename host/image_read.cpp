@@ -1,7 +1,5 @@
-#include <ImfChannelList.h>
 #include <ImfInputPart.h>
 #include <ImfMultiPartInputFile.h>
-#include <ImfTestFile.h>
 
 #include <filesystem>
 #include <stdexcept>
@@ -24,24 +22,6 @@ Source split(const std::string& spec, const std::string& layer) {
     std::error_code ignored;
     if (colon == std::string::npos || colon == 0 || fs::exists(spec, ignored)) return {spec, layer};
     return {spec.substr(0, colon), spec.substr(colon + 1)};
-}
-
-// A damaged header can ask for any amount of memory. No compression of OpenEXR packs values more tightly than this.
-void require_plausible_size(const Imf::Header& header, std::uint64_t file_bytes) {
-    const bool dwa = header.compression() == Imf::DWAA_COMPRESSION || header.compression() == Imf::DWAB_COMPRESSION;
-    const double most = static_cast<double>(file_bytes) * (dwa ? 65536 : 2048);
-    const auto& w = header.dataWindow();
-    const double pixels = (1.0 + w.max.x - w.min.x) * (1.0 + w.max.y - w.min.y);
-    double bytes = 0;
-    const auto& list = header.channels();
-    for (auto c = list.begin(); c != list.end(); ++c) bytes += c.channel().type == Imf::HALF ? 2 * pixels : 4 * pixels;
-    if (bytes > most) throw std::runtime_error("damaged: its header asks for more pixels than the file can hold");
-}
-
-void require_exr(const std::string& path) {
-    if (const auto status = fs::status(path); !fs::exists(status)) throw std::runtime_error("no such file");
-    if (fs::is_directory(path)) throw std::runtime_error("is a folder");
-    if (!Imf::isOpenExrFile(path.c_str())) throw std::runtime_error("cannot be opened, or is not an OpenEXR file");
 }
 
 Image read(const Source& source) {

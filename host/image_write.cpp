@@ -14,13 +14,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What describes the layout of the file read, not the picture. A preview would be stale; Blender would look for its
-// layers where BlenderMultiChannel stands.
-const std::set<std::string> not_carried{
-    "channels", "compression", "dataWindow", "displayWindow",      "lineOrder",
-    "tiles",    "type",        "version",    "chunkCount",         "name",
-    "view",     "multiView",   "preview",    "maxSamplesPerPixel", "BlenderMultiChannel"};
-
 /// The values of a file to be: interleaved 4-byte numbers, and alpha beside them.
 struct Planes {
     const Image& shape;
@@ -40,16 +33,6 @@ struct Planes {
     }
 };
 
-void require_channels(const Image& image) {
-    const std::set<std::string> unique(image.channels.begin(), image.channels.end());
-    if (unique.empty() || unique.size() != image.channels.size() || unique.count("") != 0)
-        throw InvalidArgument("channels", "one or more different names",
-                              std::to_string(image.channels.size()) + " channels");
-    if (image.width() < 1 || image.height() < 1)
-        throw InvalidArgument("data_window", "at least one pixel",
-                              std::to_string(image.width()) + " x " + std::to_string(image.height()));
-}
-
 void require_count(const char* name, std::uint64_t expected, std::uint64_t got) {
     if (expected != got) throw InvalidArgument(name, std::to_string(expected) + " values", std::to_string(got));
 }
@@ -58,9 +41,7 @@ Imf::Header header_of(const Planes& planes, const WriteOptions& options) {
     const Image& image = planes.shape;
     const bool no_display = image.display_window == Window{};
     Imf::Header header(box_of(no_display ? image.data_window : image.display_window), box_of(image.data_window));
-    if (image.metadata)
-        for (auto a = image.metadata->header.begin(); a != image.metadata->header.end(); ++a)
-            if (not_carried.count(a.name()) == 0) header.insert(a.name(), a.attribute());
+    if (image.metadata) carry_metadata(*image.metadata, header);
     for (const auto& [name, text] : options.attributes) header.insert(name, Imf::StringAttribute(text));
     header.compression() = Imf::ZIP_COMPRESSION;
     for (const auto& channel : image.channels) header.channels().insert(channel, Imf::Channel(planes.type));
@@ -80,9 +61,7 @@ void verify(const fs::path& path, const Planes& wanted) {
 }
 
 void write(const fs::path& path, const Planes& planes, const WriteOptions& options) {
-    const auto status = fs::status(path);
-    if (fs::exists(status) && !fs::is_regular_file(status)) throw std::runtime_error("exists and is not a regular file");
-    FileOutput stream(fs::exists(status) ? fs::canonical(path) : path);
+    FileOutput stream(output_target(path));
     {
         Imf::OutputFile file(stream, header_of(planes, options));
         file.setFrameBuffer(planes.frame());

@@ -6,7 +6,7 @@
 #include <atomic>
 #include <cstdlib>
 
-#include "state.hpp"
+#include "engine_state.hpp"
 
 namespace clratio {
 

@@ -3,8 +3,8 @@
 
 #include "cache.hpp"
 #include "embedded.hpp"
+#include "engine_state.hpp"
 #include "launch.hpp"
-#include "state.hpp"
 
 namespace clratio {
 namespace {

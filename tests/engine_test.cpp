@@ -10,8 +10,8 @@
 #include "cache.hpp"
 #include "clratio/combine.hpp"
 #include "embedded.hpp"
+#include "engine_state.hpp"
 #include "launch.hpp"
-#include "state.hpp"
 #include "support/scratch.hpp"
 #include "support/shapes.hpp"
 

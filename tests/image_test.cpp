@@ -2,22 +2,21 @@
 
 #include <ImfStringAttribute.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <bit>
 #include <cmath>
-#include <csignal>
 #include <limits>
 #include <set>
 
 #include "exr_stream.hpp"
 #include "support/exr.hpp"
+#include "support/limited.hpp"
 #include "support/scratch.hpp"
 
 using namespace clratio;
+using clratio::test::Ended;
 using clratio::test::ExrPart;
+using clratio::test::limited;
 
 namespace {
 
@@ -391,29 +390,6 @@ TEST(Image, a_link_is_followed) {
 
 namespace {
 
-enum Ended { wrote = 0, refused = 1, other = 2 };
-
-/// Calls `write` in a child process whose files may not grow beyond `limit` bytes, as on a full disk.
-template <class Write> Ended limited(std::size_t limit, const std::string& path, Write write) {
-    const pid_t child = fork();
-    if (child == 0) {
-        std::signal(SIGXFSZ, SIG_IGN);
-        const rlimit r{limit, limit};
-        setrlimit(RLIMIT_FSIZE, &r);
-        try {
-            write();
-            _exit(wrote);
-        } catch (const IoError& e) {
-            _exit(e.path == path && e.reason.find("File too large") != std::string::npos ? refused : other);
-        } catch (...) {
-            _exit(other);
-        }
-    }
-    int status = 0;
-    waitpid(child, &status, 0);
-    return WIFEXITED(status) ? static_cast<Ended>(WEXITSTATUS(status)) : other;
-}
-
 Ended write_limited(const std::string& path, const Image& image, std::size_t limit) {
     return limited(limit, path, [&] { write_image(path, image); });
 }
@@ -431,11 +407,11 @@ TEST(Image, a_full_disk_is_an_error_and_leaves_the_old_file) {
     const std::size_t size = clratio::test::bytes_of(scratch / "b.exr").size();
 
     for (std::size_t limit = 0; limit < size; limit = limit + 40 < size ? limit + 40 : limit + 1) {
-        EXPECT_EQ(write_limited(path, image, limit), refused) << limit << " of " << size << " bytes";
+        EXPECT_EQ(write_limited(path, image, limit), Ended::refused) << limit << " of " << size << " bytes";
         EXPECT_EQ(clratio::test::bytes_of(path), old);
         EXPECT_EQ(scratch.files(), 2u) << "the temporary file is gone";
     }
-    EXPECT_EQ(write_limited(path, image, size), wrote);
+    EXPECT_EQ(write_limited(path, image, size), Ended::wrote);
     EXPECT_EQ(clratio::test::bytes_of(path), clratio::test::bytes_of(scratch / "b.exr"));
     EXPECT_EQ(scratch.files(), 2u);
 }
@@ -455,8 +431,8 @@ TEST(Image, a_failed_write_that_was_swallowed_is_thrown_at_close) {
             throw IoError("a.exr", "", e.what());
         }
     };
-    EXPECT_EQ(limited(100, "a.exr", [&] { write(100); }), wrote);
-    EXPECT_EQ(limited(100, "a.exr", [&] { write(101); }), refused);
+    EXPECT_EQ(limited(100, "a.exr", [&] { write(100); }), Ended::wrote);
+    EXPECT_EQ(limited(100, "a.exr", [&] { write(101); }), Ended::refused);
     EXPECT_EQ(scratch.files(), 0u);
 }
 

@@ -10,5 +10,6 @@
 #include "clratio/histogram.hpp"
 #include "clratio/law.hpp"
 #include "clratio/moments.hpp"
+#include "clratio/snapshot.hpp"
 #include "clratio/stream.hpp"
 #include "clratio/view.hpp"

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "clratio/engine.hpp"
+#include "clratio/snapshot.hpp"
 #include "clratio/view.hpp"
 
 namespace clratio {
@@ -75,6 +76,9 @@ public:
     /// On the caller's buffers, of groups * plane_bytes() each (`batches`: half of it), of any content; they are retained.
     Moments(const Engine& engine, std::uint64_t values, MomentsOptions options, const StatePlanes& planes);
 
+    /// The state that the snapshot was taken of, bit for bit. Errors: InvalidArgument where it does not fit together.
+    Moments(const Engine& engine, const Snapshot& snapshot);
+
     static std::uint64_t plane_stride(std::uint64_t values);  ///< elements
     static std::uint64_t plane_bytes(std::uint64_t values);
     static std::uint64_t state_bytes(std::uint64_t values, MomentsOptions options = {});  ///< of all planes
@@ -106,6 +110,9 @@ public:
     /// the state lacks it.
     std::vector<std::uint32_t> bits(cl_mem StatePlanes::*plane) const;
     StatePlanes planes() const;
+
+    /// Blocking. Everything but the memory's place, as plain host data; see clratio/state.hpp for files.
+    Snapshot snapshot() const;
 
     struct State;
     State& state() const { return *state_; }

@@ -6,10 +6,12 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <optional>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -26,6 +28,8 @@ struct Surroundings {
     std::vector<std::pair<std::string, std::string>> environment{};
     std::optional<std::size_t> file_size_limit{};
     std::string out{};  ///< where stdout goes instead of Said::out
+    int signal = 0;     ///< sent once, `after` the start
+    std::chrono::microseconds after{};
 };
 
 inline Said run(const std::string& program, const std::vector<std::string>& arguments, const Surroundings& around = {}) {
@@ -45,6 +49,10 @@ inline Said run(const std::string& program, const std::vector<std::string>& argu
         }
         execv(program.c_str(), argv.data());
         _exit(127);
+    }
+    if (around.signal != 0) {
+        std::this_thread::sleep_for(around.after);
+        kill(child, around.signal);
     }
     int status = 0;
     waitpid(child, &status, 0);

@@ -27,6 +27,8 @@ void append(Combined& to, const Combined& more, bool flag_image) {
     to.flags.no_data += more.flags.no_data;
     to.flags.no_error_bar += more.flags.no_error_bar;
     to.flags.nonfinite += more.flags.nonfinite;
+    to.flags.fell_back += more.flags.fell_back;
+    to.flags.no_spread += more.flags.no_spread;
     to.flags.any += more.flags.any;
 }
 
@@ -46,10 +48,29 @@ Bands::Bands(const clratio::Engine& engine, std::uint64_t values, std::uint64_t 
     : engine_(engine), values_(values), band_(std::max(values_in_a_band / channels, std::uint64_t{1}) * channels),
       options_(options) {}
 
+Bands::Bands(const clratio::Engine& engine, const clratio::Snapshot& sums, std::uint64_t channels)
+    : Bands(engine, sums.values, channels, clratio::moments_options(sums)) {
+    for (std::uint64_t band = 0; band < bands(); ++band) {
+        auto part = clratio::slice(sums, begin(band), size(band));
+        if (band == 0) {
+            part.negatives = sums.negatives;
+            part.skipped = sums.skipped;
+        }
+        states_.emplace_back(engine_, part);
+    }
+}
+
+clratio::Snapshot Bands::snapshot() const {
+    clratio::Snapshot all = states_.front().snapshot();
+    for (auto& plane : all.planes) plane.words.reserve(values_);
+    for (std::uint64_t band = 1; band < bands(); ++band) clratio::append(all, states_[band].snapshot());
+    return all;
+}
+
 std::vector<HostBatch> Bands::slices(std::uint64_t band, std::span<const HostBatch> batches) const {
     std::vector<HostBatch> out;
     for (const auto& b : batches)
-        out.push_back({b.m.subspan(begin(band), size(band)), b.t.subspan(begin(band), size(band)), b.weight});
+        out.push_back({b.m.subspan(begin(band), size(band)), b.t.subspan(begin(band), size(band)), b.weight, b.index});
     return out;
 }
 

@@ -26,9 +26,14 @@ class Bands {
 public:
     Bands(const clratio::Engine& engine, std::uint64_t values, std::uint64_t channels, clratio::MomentsOptions options);
 
+    /// Goes on with the sums of a whole image.
+    Bands(const clratio::Engine& engine, const clratio::Snapshot& sums, std::uint64_t channels);
+
     void add(std::span<const clratio::HostBatch> batches);
     /// Of what was added.
     ReadOut read_out(const clratio::Tau& tau, const Wanted& wanted) const;
+    /// What was added, as one state of the whole image.
+    clratio::Snapshot snapshot() const;
     /// Of these batches alone, the same bits as adding them; keeps no state.
     ReadOut at_once(std::span<const clratio::HostBatch> batches, const clratio::Tau& tau, const Wanted& wanted) const;
 

@@ -20,6 +20,8 @@ Json json_of(const Options& options, const Report& r) {
                {"any", r.flags.any}}},
              {"negative_inputs", r.negatives},
              {"seconds", {{"decode", r.seconds.decode}, {"device", r.seconds.device}, {"encode", r.seconds.encode}}}};
+    if (!options.state.empty())
+        out["state"] = {{"file", options.state}, {"ranges", r.ranges}, {"held", r.held}, {"added", r.batches - r.held}};
     if (r.scores) {
         out["rmse"] = r.scores->estimate.rmse;
         out["bias"] = r.scores->estimate.bias;
@@ -51,6 +53,9 @@ void print_flags(const Options& options, const Report& r) {
 }  // namespace
 
 void print_text(const Options& options, const Report& r) {
+    if (!options.state.empty())
+        fmt::print("{}: batches {}, {} of them added now\n", options.state, r.ranges, r.batches - r.held);
+    if (options.output.empty()) return;
     fmt::print("{}: {} of {} batch{}, {}x{} pixels, {} channels, on {}\n", options.output, options.estimator, r.batches,
                r.batches == 1 ? "" : "es", r.shape.width(), r.shape.height(), r.shape.channels.size(), r.device);
     print_flags(options, r);

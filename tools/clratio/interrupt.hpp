@@ -1,11 +1,11 @@
-// Ctrl-C as a question that long work asks itself now and then.
+// Ctrl-C, and a polite kill, as a question that long work asks itself now and then.
 #pragma once
 
 #include <csignal>
 
 namespace tool {
 
-/// While one of these lives, the first SIGINT only makes asked() true; a second one ends the process as usual.
+/// While one of these lives, the first SIGINT or SIGTERM only makes asked() true; a second one ends the process as usual.
 class Interrupt {
 public:
     Interrupt();
@@ -16,7 +16,8 @@ public:
     bool asked() const;
 
 private:
-    struct sigaction before_ {};
+    struct sigaction before_int_ {
+    }, before_term_{};
 };
 
 }  // namespace tool

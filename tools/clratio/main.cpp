@@ -12,20 +12,21 @@ constexpr auto footer = R"(Exit codes:
   1  failed: a file, a device (one line on stderr names it)
   2  usage: the arguments do not parse or do not fit together
   3  done, but values were flagged and --fail-on-flag was given
-  130  stopped by Ctrl-C
+  130  stopped by Ctrl-C or SIGTERM
 
 Examples:
   clratio devices
   clratio combine --m m_*.exr --t t_*.exr --tau tau.exr -o out.exr
+  clratio merge node1.exr node2.exr -o all.exr
   clratio compare out.exr reference.exr
 
 The environment variable CLRATIO_DEVICE ("0:0", "cpu", "gpu", or a part of a name) chooses the device.)";
 
-constexpr auto add_commands = {tool::add_devices, tool::add_combine, tool::add_compare, tool::add_picture,
+constexpr auto add_commands = {tool::add_devices, tool::add_combine, tool::add_merge,   tool::add_compare, tool::add_picture,
                                tool::add_law,     tool::add_errors,  tool::add_figures, tool::add_audit};
 
 int fail(const std::string& what, int code) {
-    fmt::print(stderr, "clratio: {}\n", what);
+    std::fputs(("clratio: " + what + "\n").c_str(), stderr);  // fmt::print would throw where nothing can be written
     return code;
 }
 
@@ -48,6 +49,8 @@ int run_command(int argc, char** argv) {
         return run();
     } catch (const tool::UsageError& e) {
         return fail(e.what(), tool::usage);
+    } catch (const tool::Stopped& e) {
+        return fail(e.what(), tool::interrupted);
     } catch (const clratio::Cancelled& e) {
         return fail(e.what(), tool::interrupted);
     } catch (const std::exception& e) {

@@ -19,12 +19,19 @@ public:
     using std::runtime_error::runtime_error;
 };
 
+/// Stopped by a signal with everything saved that was done: exit code 130, the message says how to go on.
+class Stopped : public std::runtime_error {
+public:
+    using std::runtime_error::runtime_error;
+};
+
 /// What the chosen subcommand does once its options are read; returns the exit code.
 using Run = std::function<int()>;
 
 // Each adds its subcommand, which sets `run` when it is the one called.
 void add_devices(CLI::App& app, Run& run);
 void add_combine(CLI::App& app, Run& run);
+void add_merge(CLI::App& app, Run& run);
 void add_compare(CLI::App& app, Run& run);
 void add_picture(CLI::App& app, Run& run);
 void add_law(CLI::App& app, Run& run);

@@ -1,0 +1,287 @@
+#include "clratio/snapshot.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <limits>
+#include <map>
+
+#include "moments_state.hpp"
+
+namespace clratio {
+namespace {
+
+using Settings = std::vector<std::pair<std::string, std::string>>;
+
+const std::map<std::string, NonFinite> nonfinites{
+    {"skip", NonFinite::skip}, {"propagate", NonFinite::propagate}, {"fail", NonFinite::fail}};
+
+const std::map<std::string, Weights> weights{{"samples", Weights::samples}, {"reliability", Weights::reliability}};
+
+const std::map<std::string, bool> yes_or_no{{"0", false}, {"1", true}};
+
+template <class Map, class Value> std::string name_in(const Map& map, const Value& value) {
+    return std::find_if(map.begin(), map.end(), [&](const auto& entry) { return entry.second == value; })->first;
+}
+
+Settings settings_of(const MomentsOptions& o) {
+    return {{"nonfinite", name_in(nonfinites, o.nonfinite)},
+            {"ratios", name_in(yes_or_no, o.ratios)},
+            {"groups", std::to_string(o.groups)},
+            {"weights", name_in(weights, o.weights)}};
+}
+
+/// Settings taken one by one, until none is left.
+class SettingsReader {
+public:
+    explicit SettingsReader(const Settings& settings) : left_(settings.begin(), settings.end()) {}
+    template <class Map> auto take(const char* name, const Map& map) {
+        const std::string value = take(name);
+        const auto found = map.find(value);
+        if (found == map.end()) throw unknown(name, value);
+        return found->second;
+    }
+    std::uint32_t take_number(const char* name) {
+        const std::string value = take(name);
+        std::uint32_t number = 0;
+        const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), number);
+        if (error != std::errc() || end != value.data() + value.size()) throw unknown(name, value);
+        return number;
+    }
+    void require_none_left() const {
+        if (!left_.empty()) throw unknown(left_.begin()->first, left_.begin()->second);
+    }
+
+private:
+    std::string take(const char* name) {
+        const auto found = left_.extract(name);
+        if (!found) throw InvalidArgument("snapshot", std::string("the setting ") + name, "none");
+        return found.mapped();
+    }
+    static InvalidArgument unknown(const std::string& name, const std::string& value) {
+        return {"snapshot", "settings of this version", name + "=" + value};
+    }
+    std::map<std::string, std::string> left_;
+};
+
+// ---- planes: words of a snapshot, and where they lie on the device
+
+struct Place {
+    const char* name;
+    cl_mem StatePlanes::*plane;
+    std::uint64_t part;  ///< strides into the plane
+};
+
+constexpr std::array places{
+    Place{"m.hi", &StatePlanes::m, 0},
+    Place{"m.lo", &StatePlanes::m, 1},
+    Place{"t.hi", &StatePlanes::t, 0},
+    Place{"t.lo", &StatePlanes::t, 1},
+    Place{"mm.hi", &StatePlanes::mm, 0},
+    Place{"mm.lo", &StatePlanes::mm, 1},
+    Place{"tt.hi", &StatePlanes::tt, 0},
+    Place{"tt.lo", &StatePlanes::tt, 1},
+    Place{"mt.hi", &StatePlanes::mt, 0},
+    Place{"mt.lo", &StatePlanes::mt, 1},
+    Place{"weight.hi", &StatePlanes::weight, 0},
+    Place{"weight.lo", &StatePlanes::weight, 1},
+    Place{"batches", &StatePlanes::batches, 0},
+    Place{"weight2.hi", &StatePlanes::weight2, 0},
+    Place{"weight2.lo", &StatePlanes::weight2, 1},
+    Place{"quotient.hi", &StatePlanes::quotient, 0},
+    Place{"quotient.lo", &StatePlanes::quotient, 1},
+    Place{"zero_m.hi", &StatePlanes::zero_m, 0},
+    Place{"zero_m.lo", &StatePlanes::zero_m, 1},
+    Place{"zero_share.hi", &StatePlanes::zero_share, 0},
+    Place{"zero_share.lo", &StatePlanes::zero_share, 1},
+};
+
+bool recorded(const Place& place, const MomentsOptions& o) {
+    const auto p = place.plane;
+    if (p == &StatePlanes::weight || p == &StatePlanes::batches) return o.nonfinite == NonFinite::skip;
+    if (p == &StatePlanes::weight2) return o.nonfinite == NonFinite::skip && o.weights == Weights::reliability;
+    if (p == &StatePlanes::quotient || p == &StatePlanes::zero_m || p == &StatePlanes::zero_share) return o.ratios;
+    return true;
+}
+
+std::vector<Place> places_of(const MomentsOptions& o) {
+    std::vector<Place> some;
+    std::copy_if(places.begin(), places.end(), std::back_inserter(some), [&](const Place& p) { return recorded(p, o); });
+    return some;
+}
+
+std::string in_group(std::size_t group, const std::string& name) {
+    return group == 0 ? name : "g" + std::to_string(group) + "." + name;
+}
+
+/// Calls each(group, name of the plane, its device memory, byte offset there), group by group.
+template <class Each> void for_planes(const Moments::State& s, Each each) {
+    for (std::size_t g = 0; g < s.groups.size(); ++g)
+        for (const Place& place : places_of(s.options)) {
+            const std::uint64_t parts = place.plane == &StatePlanes::batches ? 1 : 2;
+            const std::uint64_t strides = g * parts + place.part;
+            each(g, in_group(g, place.name), s.planes.*place.plane,
+                 strides * Moments::plane_stride(s.values) * sizeof(float));
+        }
+}
+
+std::vector<std::string> plane_names(const Snapshot& snapshot) {
+    std::vector<std::string> names;
+    const auto some = places_of(moments_options(snapshot));
+    for (std::size_t g = 0; g < snapshot.groups.size(); ++g)
+        for (const Place& place : some) names.push_back(in_group(g, place.name));
+    return names;
+}
+
+void check_words(const Snapshot& s) {
+    const auto names = plane_names(s);
+    if (s.planes.size() != names.size())
+        throw InvalidArgument("snapshot", std::to_string(names.size()) + " planes", std::to_string(s.planes.size()));
+    for (std::size_t i = 0; i < names.size(); ++i) {
+        if (s.planes[i].name != names[i]) throw InvalidArgument("snapshot", "plane " + names[i], s.planes[i].name);
+        if (s.planes[i].words.size() != s.values)
+            throw InvalidArgument("snapshot plane " + names[i], std::to_string(s.values) + " values",
+                                  std::to_string(s.planes[i].words.size()));
+    }
+}
+
+device::clr_two two_floats(double high, double low, std::uint64_t batches) {
+    const device::clr_two w{static_cast<float>(high), static_cast<float>(low)};
+    const bool exact = static_cast<double>(w.hi) == high && static_cast<double>(w.lo) == low;
+    if (!exact || (batches == 0) != (high == 0) || !(high >= 0))
+        throw InvalidArgument("snapshot", "a weight that is the sum of two floats, above 0 where there are batches",
+                              std::to_string(high) + " + " + std::to_string(low));
+    return w;
+}
+
+Moments::State::Group group_of(const Snapshot::Group& g) {
+    check_room(0, g.batches);
+    return {g.batches, two_floats(g.weight, g.weight_low, g.batches), two_floats(g.weight2, g.weight2_low, g.batches)};
+}
+
+void check_alike(const char* call, const Snapshot& a, const Snapshot& b) {
+    if (a.kind != b.kind) throw InvalidArgument(call, "a state of kind " + a.kind, b.kind);
+    if (a.groups.size() != b.groups.size())
+        throw InvalidArgument(call, std::to_string(a.groups.size()) + " groups", std::to_string(b.groups.size()));
+    const auto text = [](const Settings& settings) {
+        std::string all;
+        for (const auto& [name, value] : settings) all += (all.empty() ? "" : " ") + name + "=" + value;
+        return all;
+    };
+    if (a.settings != b.settings) throw InvalidArgument(call, "settings " + text(a.settings), text(b.settings));
+}
+
+}  // namespace
+
+std::uint64_t Snapshot::batches() const {
+    std::uint64_t sum = 0;
+    for (const Group& g : groups) sum += g.batches;
+    return sum;
+}
+
+MomentsOptions moments_options(const Snapshot& snapshot) {
+    if (snapshot.kind != "moments") throw InvalidArgument("snapshot", "kind moments", snapshot.kind);
+    SettingsReader settings(snapshot.settings);
+    const MomentsOptions options{settings.take("nonfinite", nonfinites), settings.take("ratios", yes_or_no),
+                                 settings.take_number("groups"), settings.take("weights", weights)};
+    settings.require_none_left();
+    return options;
+}
+
+Snapshot Moments::snapshot() const {
+    const State& s = *state_;
+    wait(s.last);
+    Snapshot out{"moments", s.values, settings_of(s.options), {}, negatives(), skipped(), {}};
+    for (const auto& g : s.groups) out.groups.push_back({g.batches, g.weight.hi, g.weight.lo, g.weight2.hi, g.weight2.lo});
+    for_planes(s, [&](std::size_t group, const std::string& name, cl_mem from, std::uint64_t offset) {
+        auto& words = out.planes.emplace_back(Snapshot::Plane{name, std::vector<std::uint32_t>(s.values)}).words;
+        if (s.groups[group].batches == 0) return;  // its planes hold anything
+        check(clEnqueueReadBuffer(s.engine.queue(), from, CL_TRUE, offset, s.values * sizeof(float), words.data(), 0,
+                                  nullptr, nullptr),
+              "clEnqueueReadBuffer");
+    });
+    return out;
+}
+
+Moments::Moments(const Engine& engine, const Snapshot& snapshot)
+    : Moments(engine, snapshot.values, moments_options(snapshot)) {
+    State& s = *state_;
+    if (snapshot.groups.size() != s.groups.size())
+        throw InvalidArgument("snapshot", std::to_string(s.groups.size()) + " groups",
+                              std::to_string(snapshot.groups.size()));
+    check_words(snapshot);
+    check_room(0, snapshot.batches());
+    std::transform(snapshot.groups.begin(), snapshot.groups.end(), s.groups.begin(), group_of);
+    const std::vector<std::byte> padding((plane_stride(s.values) - s.values) * sizeof(float));
+    auto plane = snapshot.planes.begin();
+    const auto write = [&](cl_mem to, std::uint64_t offset, const auto& words) {
+        const auto bytes = std::as_bytes(std::span(words));
+        if (bytes.empty()) return;
+        check(clEnqueueWriteBuffer(engine.queue(), to, CL_TRUE, offset, bytes.size(), bytes.data(), 0, nullptr, nullptr),
+              "clEnqueueWriteBuffer");
+    };
+    for_planes(s, [&](std::size_t, const std::string&, cl_mem to, std::uint64_t offset) {
+        write(to, offset, (plane++)->words);
+        write(to, offset + s.values * sizeof(float), padding);
+    });
+    std::array<std::uint64_t, CLR_TALLY_ADD> tallies{};
+    tallies[CLR_TALLY_NEGATIVE] = snapshot.negatives;
+    tallies[CLR_TALLY_SKIPPED] = snapshot.skipped;
+    s.add_rows.write(std::as_bytes(std::span(tallies)));
+}
+
+Snapshot slice(const Snapshot& snapshot, std::uint64_t begin, std::uint64_t count) {
+    if (begin > snapshot.values || count > snapshot.values - begin)
+        throw InvalidArgument("slice", "values of a snapshot that has " + std::to_string(snapshot.values),
+                              std::to_string(begin) + " to " + std::to_string(begin + count));
+    Snapshot out{snapshot.kind, count, snapshot.settings, snapshot.groups, 0, 0, {}};
+    for (const auto& plane : snapshot.planes) {
+        const auto first = plane.words.begin() + static_cast<std::ptrdiff_t>(begin);
+        out.planes.push_back({plane.name, {first, first + static_cast<std::ptrdiff_t>(count)}});
+    }
+    return out;
+}
+
+void append(Snapshot& to, const Snapshot& more) {
+    if (to.values == 0) {
+        to = more;
+        return;
+    }
+    check_alike("append", to, more);
+    if (to.groups != more.groups) throw InvalidArgument("append", "the same batches", "others");
+    if (to.planes.size() != more.planes.size()) throw InvalidArgument("append", "the same planes", "others");
+    for (std::size_t i = 0; i < to.planes.size(); ++i) {
+        const auto& words = more.planes[i].words;
+        if (to.planes[i].name != more.planes[i].name)
+            throw InvalidArgument("append", "plane " + to.planes[i].name, more.planes[i].name);
+        to.planes[i].words.insert(to.planes[i].words.end(), words.begin(), words.end());
+    }
+    to.values += more.values;
+    to.negatives += more.negatives;
+    to.skipped += more.skipped;
+}
+
+void merge(const Engine& engine, Snapshot& into, const Snapshot& more) {
+    constexpr std::uint64_t values_at_once = std::uint64_t{1} << 20;
+    if (into.values != more.values)
+        throw InvalidArgument("merge", std::to_string(into.values) + " values", std::to_string(more.values));
+    check_alike("merge", into, more);
+    check_words(into);
+    check_words(more);
+    std::vector<Snapshot::Group> groups;
+    for (std::uint64_t begin = 0; begin < into.values; begin += values_at_once) {
+        const std::uint64_t count = std::min(values_at_once, into.values - begin);
+        Moments sum(engine, slice(into, begin, count));
+        sum.merge(Moments(engine, slice(more, begin, count)));
+        const Snapshot part = sum.snapshot();
+        for (std::size_t p = 0; p < part.planes.size(); ++p)
+            std::copy(part.planes[p].words.begin(), part.planes[p].words.end(),
+                      into.planes[p].words.begin() + static_cast<std::ptrdiff_t>(begin));
+        groups = part.groups;
+    }
+    into.groups = groups;
+    into.negatives += more.negatives;
+    into.skipped += more.skipped;
+}
+
+}  // namespace clratio

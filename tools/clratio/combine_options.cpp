@@ -1,0 +1,184 @@
+#include "combine_options.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "output_file.hpp"
+
+namespace tool::combining {
+namespace {
+
+constexpr auto footer =
+    R"(The estimate of each value (a channel of a pixel) is tau * mean(m) / mean(t) over the batches. m is what is
+rendered (shadowed light), t the same without what makes it hard (unshadowed light, the same samples), tau the exact t.
+
+Estimators:
+  ratio           tau mean(m) / mean(t); its bias goes with 1/batches (default)
+  mean            mean(m), for comparison; tau and t are not used
+  mean-of-ratios  mean of tau m / t of each batch, for comparison; keeps a bias that no number of batches removes
+
+Where mean(t) is 0 although tau is not (--zero):
+  mc-mean         the plain mean of m (default)
+  zero            0
+  one             tau, as if nothing were in shadow
+Where tau is 0 the value is mean(m) / (mean(t) + 1).
+
+A NaN or an infinity in a batch (--nonfinite):
+  skip            that batch does not count for that value (default)
+  propagate       the value becomes NaN
+  fail            nothing is written; the file and pixel are named, exit code 1
+
+Files: half, float or uint EXR; scanline, tiled or multi-part; all of one size, window and channels. FILE:LAYER names a
+layer in one file, --layer one for all; with one colour layer in the file it is found without asking. Alpha is taken
+from the first file of --m. The output is float, ZIP, with the windows and attributes of that file and the settings used.
+--flags: a UINT for each value; 1 mean t is 0, 2 tau is 0, 4 batch skipped, 8 no data, 16 no error bar, 32 not finite.
+--stderr: the standard error by the delta method; +inf with one batch. Without it a missing error bar is no flag that
+--fail-on-flag looks at.
+
+--state FILE keeps the sums, so that more batches can be added later or elsewhere: nothing is read twice, no batch counts
+twice. A batch's index is --first-batch (0) plus its place in the list. With --resume the run goes on with FILE if it is
+there, and skips listed batches that it holds: the same command again finishes what was stopped. FILE is replaced whole,
+every --checkpoint seconds and at the end; Ctrl-C and SIGTERM save and exit with 130, a kill loses what came after the last
+checkpoint, a full disk loses nothing. Without --output batches are added, no more; without --m the state is read out.
+Machines of a farm keep a state each, with their own --first-batch, and clratio merge joins them.
+
+--watch DIR adds what a renderer writes to DIR. --m and --t are patterns there, "m_*.exr" "t_*.exr" or "b_*.exr:shadow"
+"b_*.exr:light" (quoted!), where * is a number, the batch's index: the same after every restart. A pair counts when both
+files have stood still for --settle seconds and open completely. The outputs are written anew after each launch of batches.
+It ends on --until-batches N (in the sums), on --until-error E (the root mean square of the standard error, over the values
+that have one, in units of m), or on Ctrl-C.
+
+--json prints batches, pixels, channels, estimator, device, output, flags (how many values carry each; any: at least one),
+negative_inputs, seconds (decode, summed over the reading threads; device; encode), with --state also state (file, ranges,
+held: batches it began with, added: batches since) and with --reference rmse, bias, rmse_mean and bias_mean (of the plain
+mean), over the values that are finite in both files.
+
+Exit codes: 0 done, 1 failed, 2 usage, 3 done but values were flagged and --fail-on-flag was given, 130 stopped.
+
+Examples:
+  clratio combine --m m_*.exr --t t_*.exr --tau tau.exr -o out.exr
+  clratio combine --m a_m.exr b_m.exr --t a_t.exr b_t.exr --tau 1 -o out.exr --layer ViewLayer.Combined
+  clratio combine --m m_*.exr --t t_*.exr --tau t_ref.exr -o out.exr --reference m_ref.exr --stderr error.exr --json
+  clratio combine --m m_*.exr --t t_*.exr --tau tau.exr -o out.exr --state sums.exr --resume
+  clratio combine --watch renders --m "m_*.exr" --t "t_*.exr" --tau tau.exr -o out.exr --state sums.exr --resume)";
+
+std::vector<std::string> outputs(const Options& options) {
+    std::vector<std::string> files{options.output, options.standard_error, options.flags, options.state};
+    files.erase(std::remove(files.begin(), files.end(), ""), files.end());
+    return files;
+}
+
+void require_counts(const Options& options) {
+    if (options.m.size() != options.t.size())
+        throw UsageError(fmt::format("batch k of --m belongs to batch k of --t, but --m has {} files and --t has {}",
+                                     options.m.size(), options.t.size()));
+}
+
+void require_different(const Options& options) {
+    std::vector<std::string> files;
+    for (const auto& file : outputs(options)) {
+        if (std::find(files.begin(), files.end(), file) != files.end()) throw UsageError(file + ": named for two outputs");
+        files.push_back(file);
+    }
+}
+
+void require_error_bar(const Options& options) {
+    if (!options.standard_error.empty() && options.estimator == "mean-of-ratios")
+        throw UsageError("--stderr: mean-of-ratios has no standard error; ratio and mean have one");
+}
+
+void require_enough(const Options& options) {
+    const bool state_alone = !options.state.empty() && options.resume;
+    if (options.m.empty() && !state_alone)
+        throw UsageError("--m is required (or --state FILE --resume, to read a state out)");
+    if (options.output.empty() && options.state.empty()) throw UsageError("--output is required (or --state, to add only)");
+    if (options.output.empty() && options.m.empty()) throw UsageError("--output is required where no batch is added");
+    if (!options.output.empty() && options.tau.empty()) throw UsageError("--tau is required for an output");
+    if (!options.output.empty()) return;
+    const std::vector<std::pair<const char*, bool>> needing{{"--stderr", !options.standard_error.empty()},
+                                                            {"--flags", !options.flags.empty()},
+                                                            {"--reference", !options.reference.empty()},
+                                                            {"--fail-on-flag", options.fail_on_flag},
+                                                            {"--until-error", options.until_error.has_value()}};
+    for (const auto& [name, given] : needing)
+        if (given) throw UsageError(std::string(name) + " needs --output: without it batches are added to --state, no more");
+}
+
+void require_state(const Options& options) {
+    if (options.state.empty() && options.resume) throw UsageError("--resume needs --state, the file to go on with");
+    if (!options.state.empty() && !options.resume && std::filesystem::exists(options.state))
+        throw UsageError("--state " + options.state +
+                         ": exists already; --resume goes on with it, another name starts anew");
+}
+
+void require_watch(const Options& options) {
+    if (options.watch.empty()) {
+        if (options.until_batches || options.until_error)
+            throw UsageError("--until-batches and --until-error are for --watch");
+        return;
+    }
+    if (options.m.size() != 1 || options.t.size() != 1)
+        throw UsageError("--watch takes one pattern for --m and one for --t; quote them, or the shell expands the *");
+}
+
+}  // namespace
+
+void add_options(CLI::App& app, const std::shared_ptr<Options>& o) {
+    CLI::App* const command = &app;
+    const auto choice = [&](const char* name, std::string& value, const auto& map, const char* help) {
+        std::vector<std::string> words;
+        for (const auto& entry : map) words.push_back(entry.first);
+        return command->add_option(name, value, help)->type_name("WORD")->check(CLI::IsMember(words))->capture_default_str();
+    };
+    command->add_option("--m", o->m, "Batches of m, one file each; with --watch a pattern")->type_name("FILE");
+    command->add_option("--t", o->t, "Batches of t, in the same order; with --watch a pattern")->type_name("FILE");
+    command->add_option("--tau", o->tau, "The mean of t: a number, one for each channel, or files, which are averaged")
+        ->type_name("FILE|NUMBER");
+    command->add_option("-o,--output", o->output, "The combined image")->type_name("OUT.exr");
+    choice("--estimator", o->estimator, estimators, "How batches become an estimate");
+    choice("--zero", o->zero, zeros, "What a zero denominator gives");
+    choice("--nonfinite", o->nonfinite, nonfinites, "What a NaN or an infinity in a batch does")
+        ->each([o](const std::string&) { o->nonfinite_given = true; });
+    command->add_option("--stderr", o->standard_error, "Also write the standard error of each value")->type_name("FILE");
+    command->add_option("--flags", o->flags, "Also write the flags of each value")->type_name("FILE");
+    command->add_option("--layer", o->layer, "The layer to read where a file names none")->type_name("NAME");
+    command->add_option("--reference", o->reference, "Print RMSE and bias of the plain mean and of the estimate against it")
+        ->type_name("FILE");
+    command->add_option("--state", o->state, "Keep the sums in this file, which later runs and machines can go on with")
+        ->type_name("STATE.exr");
+    command->add_flag("--resume", o->resume, "Go on with --state; listed batches that it holds are skipped");
+    command->add_option("--first-batch", o->first_batch, "The index of the first listed batch")
+        ->type_name("N")
+        ->capture_default_str();
+    command->add_option("--checkpoint", o->checkpoint, "Save the state every so many seconds; 0: after each launch")
+        ->type_name("SECONDS")
+        ->check(CLI::NonNegativeNumber)
+        ->capture_default_str();
+    command->add_option("--watch", o->watch, "Add the files of this folder that fit the patterns --m and --t as they appear")
+        ->type_name("DIR");
+    command->add_option("--settle", o->settle, "A file counts when its size and time have stood still for so long")
+        ->type_name("SECONDS")
+        ->check(CLI::NonNegativeNumber)
+        ->capture_default_str();
+    command->add_option("--until-batches", o->until_batches, "End --watch when the sums hold so many batches")
+        ->type_name("N")
+        ->check(CLI::PositiveNumber);
+    command->add_option("--until-error", o->until_error, "End --watch when the RMS of the standard error is at most this")
+        ->type_name("E")
+        ->check(CLI::PositiveNumber);
+    command->add_flag("--fail-on-flag", o->fail_on_flag, "Exit with code 3 if any value was flagged");
+    command->add_flag("--json", o->json, "Print one JSON object instead of text");
+    command->footer(footer);
+}
+
+void check(const Options& options) {
+    require_enough(options);
+    require_counts(options);
+    require_different(options);
+    require_error_bar(options);
+    require_state(options);
+    require_watch(options);
+    for (const auto& file : outputs(options)) require_folder_of(file);
+}
+
+}  // namespace tool::combining

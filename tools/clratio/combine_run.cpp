@@ -1,0 +1,153 @@
+#include "combine_run.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+namespace tool::combining {
+namespace {
+
+using clratio::NonFinite;
+
+template <class Work> auto timed(double& seconds, Work work) {
+    struct Add {
+        double& to;
+        std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
+        ~Add() { to += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); }
+    } add{seconds};
+    return work();
+}
+
+clratio::WriteOptions settings(const Options& options, const Report& report) {
+    std::string tau = options.tau.front();
+    for (std::size_t i = 1; i < options.tau.size(); ++i) tau += " " + options.tau[i];
+    return {{{"clratio/version", CLRATIO_VERSION},
+             {"clratio/estimator", options.estimator},
+             {"clratio/zero", options.zero},
+             {"clratio/nonfinite", report.nonfinite},
+             {"clratio/batches", std::to_string(report.batches)},
+             {"clratio/ranges", report.ranges},
+             {"clratio/tau", tau},
+             {"clratio/device", report.device}}};
+}
+
+std::string name_of(NonFinite value) {
+    const auto same = [&](const auto& entry) { return entry.second == value; };
+    return std::find_if(nonfinites.begin(), nonfinites.end(), same)->first;
+}
+
+double root_mean_square(const std::vector<float>& errors) {
+    double sum = 0;
+    std::uint64_t finite = 0;
+    for (const float e : errors) {
+        if (!std::isfinite(e)) continue;
+        sum += static_cast<double>(e) * e;
+        ++finite;
+    }
+    return finite == 0 ? std::numeric_limits<double>::infinity() : std::sqrt(sum / static_cast<double>(finite));
+}
+
+}  // namespace
+
+CombineRun::CombineRun(const Options& options)
+    : options_(options), tau_(options.tau), keeper_(options),
+      engine_(timed(report_.seconds.device, [] { return clratio::Engine{}; })), moments_(options.moments()) {
+    report_.device = engine_.info().name;
+    report_.held = batches();
+    if (const auto sums = keeper_.take_sums()) {
+        moments_ = clratio::moments_options(*sums);
+        bands_.emplace(engine_, *sums, keeper_.shape().channels.size());
+    }
+    report_.nonfinite = name_of(moments_.nonfinite);
+    if (bands_) fit_tau();
+}
+
+// What depends on the size of the images: said before the batches are added, not after.
+void CombineRun::fit_tau() {
+    if (!options_.output.empty())
+        timed(report_.seconds.decode, [&] { tau_.fit(keeper_.shape(), options_.tau, options_.layer); });
+    if (!options_.reference.empty())
+        reference_ =
+            timed(report_.seconds.decode, [&] { return read_like(keeper_.shape(), options_.reference, options_.layer); });
+}
+
+std::vector<clratio::HostBatch> CombineRun::accept(const std::vector<Pair>& pairs) {
+    std::vector<clratio::HostBatch> batches;
+    for (const Pair& pair : pairs) {
+        const bool first = keeper_.shape().channels.empty();
+        keeper_.fit(pair);
+        if (first) fit_tau();
+        if (moments_.nonfinite == NonFinite::fail) {
+            require_finite(pair.m);
+            require_finite(pair.t);
+        }
+        batches.push_back({pair.m, pair.t, 1, pair.index});
+    }
+    return batches;
+}
+
+void CombineRun::add(const std::vector<Pair>& pairs) {
+    const auto batches = accept(pairs);
+    if (!bands_) bands_.emplace(engine_, pairs.front().m.size(), keeper_.shape().channels.size(), moments_);
+    whole_ = false;
+    timed(report_.seconds.device, [&] { bands_->add(batches); });
+    whole_ = true;
+    for (const Pair& pair : pairs) keeper_.added(pair);
+    if (keeper_.due()) save();
+}
+
+void CombineRun::add_and_read_out(const std::vector<Pair>& pairs) {
+    const auto batches = accept(pairs);
+    for (const Pair& pair : pairs) keeper_.added(pair);
+    const Bands bands(engine_, pairs.front().m.size(), keeper_.shape().channels.size(), moments_);
+    write(timed(report_.seconds.device, [&] { return bands.at_once(batches, tau_, options_.wanted()); }));
+}
+
+void CombineRun::save() {
+    if (bands_ && whole_) timed(report_.seconds.encode, [&] { keeper_.save(*bands_); });
+}
+
+std::string CombineRun::how_to_go_on() const {
+    if (options_.state.empty()) return fmt::format("stopped after {} batches", batches());
+    if (batches() == 0) return "stopped before the first batch; there is no state to go on with";
+    return fmt::format("stopped: {} holds batches {}; the same command with --resume goes on", options_.state,
+                       keeper_.ranges().text());
+}
+
+void CombineRun::read_out() {
+    write(timed(report_.seconds.device, [&] { return bands_->read_out(tau_, options_.wanted()); }));
+}
+
+void CombineRun::write(ReadOut&& read_out) {
+    const auto out = clratio::combined_image(std::move(read_out.chosen), keeper_.shape());
+    report_.batches = batches();
+    report_.ranges = keeper_.ranges().text();
+    report_.flags = out.flags;
+    report_.flagged = read_out.flagged;
+    report_.negatives = read_out.negatives;
+    rms_error_ = root_mean_square(out.standard_error.values);
+    if (!options_.reference.empty()) {
+        const auto mean = clratio::combined_image(std::move(read_out.mean), keeper_.shape());
+        report_.scores = {difference(out.estimate, reference_), difference(mean.estimate, reference_)};
+    }
+    timed(report_.seconds.encode, [&] {
+        const auto with = settings(options_, report_);
+        clratio::write_image(options_.output, out.estimate, with);
+        if (!options_.standard_error.empty()) clratio::write_image(options_.standard_error, out.standard_error, with);
+        if (!options_.flags.empty()) clratio::write_flags(options_.flags, out.estimate, out.flag_image, with);
+    });
+}
+
+int CombineRun::report(double decode) {
+    report_.seconds.decode += decode;
+    report_.shape = keeper_.shape();
+    report_.batches = batches();
+    report_.ranges = keeper_.ranges().text();
+    if (options_.json)
+        print(json_of(options_, report_));
+    else
+        print_text(options_, report_);
+    return options_.fail_on_flag && report_.flagged > 0 ? flagged : ok;
+}
+
+}  // namespace tool::combining

@@ -1,0 +1,60 @@
+// One run of clratio combine: sums on the device, the state they are kept in, and the images that are read out.
+#pragma once
+
+#include "clratio/engine.hpp"
+#include "combine_report.hpp"
+#include "combine_state.hpp"
+
+namespace tool::combining {
+
+class CombineRun {
+public:
+    explicit CombineRun(const Options& options);
+
+    bool holds(std::uint64_t index) const { return keeper_.ranges().contains(index); }
+    std::uint64_t batches() const { return keeper_.ranges().count(); }
+
+    /// Adds to the sums; saves them where --checkpoint says so.
+    void add(const std::vector<Pair>& pairs);
+    /// Where these are all there will ever be, and no state is kept: adds and reads out in one pass.
+    void add_and_read_out(const std::vector<Pair>& pairs);
+    /// Saves what was added since the last time; nothing where the device failed in the middle of adding.
+    void save();
+    /// save() after `work`, however it ends.
+    template <class Work> void saved_at_the_end(Work work) {
+        try {
+            work();
+        } catch (...) {
+            save();
+            throw;
+        }
+        save();
+    }
+    std::string how_to_go_on() const;
+
+    /// Reads out what was added and writes the images.
+    void read_out();
+    /// Root mean square of the standard errors read out last, over the values that have one; +inf where none has.
+    double rms_error() const { return rms_error_; }
+
+    /// Prints, and gives the exit code. `decode`: seconds spent reading images elsewhere.
+    int report(double decode);
+
+private:
+    void fit_tau();
+    std::vector<clratio::HostBatch> accept(const std::vector<Pair>& pairs);
+    void write(ReadOut&& read_out);
+
+    const Options& options_;
+    TauInput tau_;
+    Report report_;
+    StateKeeper keeper_;
+    clratio::Engine engine_;
+    std::optional<Bands> bands_;
+    clratio::MomentsOptions moments_;
+    clratio::Image reference_;
+    bool whole_ = true;  ///< all bands hold the same batches
+    double rms_error_ = 0;
+};
+
+}  // namespace tool::combining

@@ -1,0 +1,83 @@
+#include "combine_state.hpp"
+
+namespace tool::combining {
+namespace {
+
+using Settings = std::vector<std::pair<std::string, std::string>>;
+
+Settings settings_of(const Pair& pair) { return {{"layer.m", pair.m.layer}, {"layer.t", pair.t.layer}}; }
+
+clratio::Image without_values(clratio::Image image) {
+    image.values = {};
+    return image;
+}
+
+std::string text_of(const Settings& settings) {
+    std::string all;
+    for (const auto& [name, value] : settings)
+        all += (all.empty() ? "" : ", ") + name + " " + (value.empty() ? "(unnamed)" : value);
+    return all;
+}
+
+void require_fitting(const Options& options, const clratio::Snapshot& sums) {
+    const auto recorded = clratio::moments_options(sums);
+    const auto named = [](const auto& entry, auto value) { return entry.second == value; };
+    const auto refuse = [&](const std::string& option, const std::string& how) {
+        throw UsageError(option + " does not fit --state " + options.state + ", which was recorded " + how);
+    };
+    const auto was = std::find_if(nonfinites.begin(), nonfinites.end(),
+                                  [&](const auto& entry) { return named(entry, recorded.nonfinite); });
+    if (options.nonfinite_given && nonfinites.at(options.nonfinite) != recorded.nonfinite)
+        refuse("--nonfinite " + options.nonfinite, "with --nonfinite " + was->first);
+    if (options.moments().ratios && !recorded.ratios)
+        refuse("--estimator " + options.estimator, "without what that needs; begin a state with this option");
+}
+
+}  // namespace
+
+StateKeeper::StateKeeper(const Options& options) : options_(options) {
+    if (options.state.empty()) return;
+    if (!options.m.empty()) lock_.emplace(options.state);
+    if (!options.m.empty() && !std::filesystem::exists(options.state)) return;
+    state_ = clratio::read_state(options.state);
+    require_fitting(options, state_.sums);
+}
+
+std::optional<clratio::Snapshot> StateKeeper::take_sums() {
+    if (state_.ranges.empty()) return std::nullopt;
+    return std::exchange(state_.sums, {});
+}
+
+void StateKeeper::fit(const Pair& pair) {
+    const auto settings = settings_of(pair);
+    if (state_.shape.channels.empty()) {
+        state_.shape = without_values(pair.m);
+        state_.settings = settings;
+    }
+    clratio::require_same_shape(state_.shape, pair.m);
+    clratio::require_same_shape(pair.m, pair.t);
+    if (!options_.state.empty() && settings != state_.settings)
+        throw clratio::IoError(pair.m.path, pair.m.layer,
+                               text_of(settings) + ", but " + options_.state + " holds " + text_of(state_.settings));
+}
+
+void StateKeeper::added(const Pair& pair) {
+    state_.ranges.add({pair.index, pair.index + 1});
+    changed_ = true;
+}
+
+bool StateKeeper::due() const {
+    return !options_.state.empty() && changed_ &&
+           std::chrono::steady_clock::now() - saved_ >= std::chrono::duration<double>(options_.checkpoint);
+}
+
+void StateKeeper::save(const Bands& bands) {
+    if (options_.state.empty() || !changed_) return;
+    state_.sums = bands.snapshot();
+    clratio::write_state(options_.state, state_);
+    state_.sums = {};
+    changed_ = false;
+    saved_ = std::chrono::steady_clock::now();
+}
+
+}  // namespace tool::combining

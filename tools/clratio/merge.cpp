@@ -1,0 +1,78 @@
+// clratio merge: the states of many machines to one.
+#include "clratio/state.hpp"
+#include "file_lock.hpp"
+#include "output_file.hpp"
+#include "tool.hpp"
+
+namespace tool {
+namespace {
+
+struct Options {
+    std::vector<std::string> states;
+    std::string output;
+    bool json = false;
+};
+
+/// A state that stands where the output goes must not lose batches by it.
+void require_nothing_lost(const std::string& output, const clratio::BatchRanges& merged) {
+    if (!std::filesystem::exists(output)) return;
+    const clratio::BatchRanges there = clratio::inspect_state(output).ranges;
+    for (const auto& range : there.ranges())
+        for (std::uint64_t k = range.begin; k < range.end; ++k)
+            if (!merged.contains(k))
+                throw clratio::IoError(
+                    output, "", "would lose batch " + std::to_string(k) + ", which it holds and the merged states do not");
+}
+
+int merge(const Options& options) {
+    require_folder_of(options.output);
+    const FileLock lock(options.output);
+    const clratio::Engine engine;
+    const std::vector<std::filesystem::path> paths(options.states.begin(), options.states.end());
+    const clratio::StateFile merged = clratio::merge_states(engine, paths);
+    require_nothing_lost(options.output, merged.ranges);
+    clratio::write_state(options.output, merged);
+    const auto& shape = merged.shape;
+    if (options.json)
+        print({{"output", options.output},
+               {"states", options.states.size()},
+               {"batches", merged.sums.batches()},
+               {"ranges", merged.ranges.text()},
+               {"width", shape.width()},
+               {"height", shape.height()},
+               {"channels", shape.channels}});
+    else
+        fmt::print("{}: {} batches {} of {} states, {}x{} pixels, {} channels\n", options.output, merged.sums.batches(),
+                   merged.ranges.text(), options.states.size(), shape.width(), shape.height(), shape.channels.size());
+    return ok;
+}
+
+constexpr auto footer =
+    R"(A state is what combine --state writes: the sums of some batches, and which ones. Merging gives the sums of all of them,
+as if one machine had added them. The states are taken in the order of the first batch each holds, whatever order they are
+named in: the bytes of the output do not depend on it.
+
+Refused, with the reason and both names: states that hold the same batch, that differ in size, windows, channels, layers or
+settings, and files that are damaged. The output appears whole or not at all; one that holds other batches is not replaced.
+
+Exit codes: 0 done, 1 failed, 2 usage.
+
+Examples:
+  clratio combine --m m_0*.exr --t t_0*.exr --state node0.exr                    (on one machine)
+  clratio combine --m m_1*.exr --t t_1*.exr --state node1.exr --first-batch 1000 (on another)
+  clratio merge node0.exr node1.exr -o all.exr
+  clratio combine --state all.exr --resume --tau tau.exr -o out.exr)";
+
+}  // namespace
+
+void add_merge(CLI::App& app, Run& run) {
+    auto o = std::make_shared<Options>();
+    auto* command = app.add_subcommand("merge", "Merge states of combine --state, from many machines, to one");
+    command->add_option("states", o->states, "The states")->required()->type_name("STATE.exr");
+    command->add_option("-o,--output", o->output, "The merged state")->required()->type_name("OUT.exr");
+    command->add_flag("--json", o->json, "Print one JSON object instead of text");
+    command->footer(footer);
+    command->callback([=, &run] { run = [o] { return merge(*o); }; });
+}
+
+}  // namespace tool
