@@ -26,6 +26,7 @@
 #define CLR_NAMESPACE_END
 #define CLR_FN static inline
 #define CLR_CONSTANT constant
+#define CLR_GLOBAL global
 #define CLR_JOIN_(a, b) a##b
 #define CLR_JOIN(a, b) CLR_JOIN_(a, b)
 
@@ -132,6 +133,7 @@ typedef ulong8 clr_pairs;
 #define CLR_NAMESPACE_END }
 #define CLR_FN inline
 #define CLR_CONSTANT constexpr
+#define CLR_GLOBAL
 
 CLR_NAMESPACE_BEGIN
 
