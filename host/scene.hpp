@@ -15,6 +15,9 @@ CameraAxes axes_of(const Camera& camera, Frame frame);
 
 void check_frame(Frame frame);
 
+/// Rows with their count put in. Errors: InvalidArgument for rows outside the frame.
+Rows checked(Rows rows, Frame frame);
+
 /// The Henyey-Greenstein phase function.
 double phase_of(double g, double cosine);
 

@@ -47,7 +47,7 @@ typedef struct {
     float sigma_mean, inverse_sigma_mean;
     float phase[3];  // (1 - g^2) / (4 pi), 1 + g^2, 2 g
     clr_u32 channel[3];
-    clr_u32 width, height, spheres, boxes, axial;  // axial: some inverse_omega is 0
+    clr_u32 width, height, spheres, boxes, axial, plane;  // axial: some inverse_omega is 0; plane: see shares
 } clr_medium;
 
 // One after the other in memory, spheres first.
@@ -246,10 +246,10 @@ CLR_FN clr_real clr_piece_integral(const clr_medium_ray* ray, int piece, float s
 
 // The ray through pixel (column, row). `row` is the same in all lanes.
 CLR_FN clr_medium_ray clr_aim(clr_medium s, CLR_GLOBAL const float* occluders, clr_uint column, clr_u32 row) {
-    const clr_real zero = (clr_real)(0.0f), half = (clr_real)(0.5f), one = (clr_real)(1.0f);
+    const clr_real zero = (clr_real)(0.0f), middle = (clr_real)(0.5f), one = (clr_real)(1.0f);
     clr_medium_ray ray;
-    const clr_real a = clr_fma(clr_to_real(clr_to_int(column)) + half, (clr_real)(s.pixel[0]), -one);
-    const clr_real b = clr_fma((clr_real)((float)row) + half, (clr_real)(-s.pixel[1]), one);
+    const clr_real a = clr_fma(clr_to_real(clr_to_int(column)) + middle, (clr_real)(s.pixel[0]), -one);
+    const clr_real b = clr_fma((clr_real)((float)row) + middle, (clr_real)(-s.pixel[1]), one);
     for (int k = 0; k < 3; ++k)
         ray.direction[k] = clr_fma(b, (clr_real)(s.up[k]), clr_fma(a, (clr_real)(s.right[k]), (clr_real)(s.forward[k])));
     const clr_real inverse = one / clr_sqrt(clr_dot(ray.direction, ray.direction));
@@ -535,11 +535,12 @@ CLR_FN clr_medium_sample clr_sample(clr_u32 sampling, clr_medium s, const clr_me
 // g_k = p_k / omega_k and their differences, in which the shadow of a box is a product of intervals.
 #define CLR_SPHERE_COORDINATES 3
 #define CLR_BOX_COORDINATES 6
+#define CLR_SHADOW_LIST (2u * CLR_MOST_OCCLUDERS)
 
 typedef struct {
     clr_real base[9], rate[9];
     clr_u32 spheres, boxes;                // how many of them can shade the ray
-    clr_u32 list[2 * CLR_MOST_OCCLUDERS];  // where they stand; boxes from CLR_MOST_OCCLUDERS on
+    clr_u32* list;  // where they stand; boxes from CLR_MOST_OCCLUDERS on. Memory of the caller: CLR_SHADOW_LIST long
 } clr_shadows;
 
 typedef struct {
@@ -729,6 +730,43 @@ CLR_FN clr_medium_sums clr_add_samples(clr_u32 generator, clr_u32 sampling, clr_
         }
     }
     return sums;
+}
+
+// The order of sampling and adding. levels = 0: sampler.samples samples, in chunks summed apart. Else the sums of 1, 2, 4, ..
+// samples, one level to a step: of one stream where the pattern is iid, each of its own where it is not.
+typedef struct {
+    clr_u32 from, to;
+    clr_sampler sampler;
+    clr_u32 fresh, apart;  // begin at 0; add the sums so far to those of this step
+} clr_step;
+
+CLR_FN clr_u32 clr_step_count(clr_sampler sampler, clr_u32 levels) {
+    return levels ? levels : (sampler.samples + CLR_SUM_CHUNK - 1) / CLR_SUM_CHUNK;
+}
+
+CLR_FN clr_step clr_step_of(clr_sampler sampler, clr_u32 levels, clr_u32 k) {
+    clr_step step;
+    step.sampler = sampler;
+    step.apart = !levels;
+    step.fresh = !levels || sampler.pattern != CLR_IID;
+    step.from = levels ? 0 : k * CLR_SUM_CHUNK;
+    step.to = sampler.samples - step.from < CLR_SUM_CHUNK ? sampler.samples : step.from + CLR_SUM_CHUNK;
+    if (levels) {
+        step.to = 1u << k;
+        step.from = !step.fresh && k > 0 ? step.to / 2 : 0;
+        step.sampler.samples = step.to;
+        step.sampler.inverse_samples = 1.0f / (float)step.to;
+    }
+    return step;
+}
+
+CLR_FN clr_medium_sums clr_do_step(clr_step step, clr_u32 generator, clr_u32 sampling, clr_medium s,
+                                   CLR_GLOBAL const float* occluders, const clr_medium_ray* ray, const clr_medium_plan* plan,
+                                   const clr_shadows* shadows, clr_stream stream, clr_u32 pixel, clr_medium_sums sums) {
+    const clr_medium_sums start = step.fresh ? clr_no_samples() : sums;
+    const clr_medium_sums part = clr_add_samples(generator, sampling, step.sampler, s, occluders, ray, plan, shadows, stream,
+                                                 pixel, step.from, step.to, start);
+    return step.apart ? clr_add_sums(sums, part) : part;
 }
 
 // Estimates of a value from sums, and their errors. share: mu / tau.
