@@ -238,15 +238,16 @@ struct MediumErrorSums {
 };
 
 /// Errors of images of seeds seeds.first .. and of `rows`, for the levels 1, 2, 4, .. samples. Index:
-/// ((row or none) * levels + level) * 6 + 3 * ratio + channel, ratio = 0 for the mean of m, 1 for the ratio estimate.
+/// ((seed * rows + row) * levels + level) * 6 + 3 * ratio + channel, counts without the first term; ratio = 0 for the mean of m, 1 for the ratio estimate.
 struct MediumErrors {
     std::uint32_t levels = 0;
     IndexRange seeds;
     Rows rows;
+    Bins bins;
     double unit = 0;
     std::vector<MediumErrorCounts> counts;  ///< levels x 6
     std::vector<MediumErrorSums> sums;      ///< seeds x rows x levels x 6
-    std::vector<std::uint32_t> pixels;      ///< rows: those whose rays hit the medium
+    std::vector<std::uint32_t> pixels;      ///< for each row, how many rays hit the medium
 };
 
 struct MediumErrorOptions {

@@ -9,6 +9,7 @@
 #include "clratio/device/histogram.h"
 #include "clratio/device/quantile.h"
 #include "clratio/device/stream.h"
+#include "clratio/device/twofloat.h"
 
 CLR_NAMESPACE_BEGIN
 
@@ -37,8 +38,9 @@ CLR_NAMESPACE_BEGIN
 // A scene as kernels take it. Channels are in the order of their sigma, those without light last; `channel` says which is
 // which. Axes along which the light does not travel have inverse_omega 0 and an exit CLR_FAR away.
 typedef struct {
-    float eye[3], forward[3], right[3], up[3];  // right and up reach to the edges of the image
-    float pixel[2];                             // 2 / width, 2 / height
+    float eye[3];
+    float forward[2][3], right[2][3], up[2][3];  // two floats each; right and up reach from one pixel half way to the next
+    float to_lo[2][3], to_hi[2][3];              // two floats each; from the eye to the corners of the box
     float lo[3], hi[3];
     float omega[3], inverse_omega[3], exit[3], beyond[3];
     float across[2][3];                             // with omega an orthonormal frame
@@ -244,26 +246,77 @@ CLR_FN clr_real clr_piece_integral(const clr_medium_ray* ray, int piece, float s
     return length * clr_exp((clr_real)(-sigma) * low) * (clr_decayed(z) / z);
 }
 
+// c + i a + j b, where each number but i and j is of two floats.
+CLR_FN clr_two clr_combine_axes(const float c[2][3], clr_real i, const float a[2][3], clr_real j, const float b[2][3], int k) {
+    const clr_two ia = clr_two_product(i, (clr_real)(a[0][k])), jb = clr_two_product(j, (clr_real)(b[0][k]));
+    const clr_two first = clr_two_sum((clr_real)(c[0][k]), ia.hi), second = clr_two_sum(first.hi, jb.hi);
+    const clr_real low = clr_fma(j, (clr_real)(b[1][k]), clr_fma(i, (clr_real)(a[1][k]), (clr_real)(c[1][k])));
+    return clr_two_make(second.hi, (first.lo + second.lo) + (ia.lo + jb.lo) + low);
+}
+
+// c / d within a few 2^-46.
+CLR_FN clr_two clr_two_quotient(float high, float low, clr_two d) {
+    const clr_real q = (clr_real)(high) / d.hi;
+    const clr_real rest = clr_fma(-q, d.hi, (clr_real)(high)) + clr_fma(-q, d.lo, (clr_real)(low));
+    return clr_two_make(q, rest / d.hi);
+}
+
+CLR_FN clr_two clr_choose(clr_mask first, clr_two a, clr_two b) {
+    return clr_two_make(first ? a.hi : b.hi, first ? a.lo : b.lo);
+}
+
+// Where a ray enters and leaves the medium's box, in units of its direction. In two floats: the ends of short chords at the
+// edges of the box would lose most digits in one.
+typedef struct {
+    clr_two enter, leave;
+} clr_chord;
+
+CLR_FN clr_chord clr_box_chord(clr_medium s, const clr_two* direction) {
+    const clr_real zero = (clr_real)(0.0f), one = (clr_real)(1.0f);
+    clr_chord chord;
+    chord.enter = clr_two_make((clr_real)(-CLR_FAR), zero);
+    chord.leave = clr_two_make((clr_real)(CLR_FAR), zero);
+    for (int k = 0; k < 3; ++k) {
+        const clr_mask along = direction[k].hi == zero;
+        const clr_real reach = (clr_real)(s.to_lo[0][k] <= 0.0f && s.to_hi[0][k] >= 0.0f ? CLR_FAR : -CLR_FAR);
+        const clr_two d = clr_choose(along, clr_two_make(one, zero), direction[k]);
+        const clr_two a = clr_two_quotient(s.to_lo[0][k], s.to_lo[1][k], d);
+        const clr_two b = clr_two_quotient(s.to_hi[0][k], s.to_hi[1][k], d);
+        const clr_mask upward = d.hi > zero;
+        const clr_two enter = clr_choose(along, clr_two_make(-reach, zero), clr_choose(upward, a, b));
+        const clr_two leave = clr_choose(along, clr_two_make(reach, zero), clr_choose(upward, b, a));
+        chord.enter = clr_choose(enter.hi > chord.enter.hi, enter, chord.enter);
+        chord.leave = clr_choose(leave.hi < chord.leave.hi, leave, chord.leave);
+    }
+    chord.enter = clr_choose(chord.enter.hi > zero, chord.enter, clr_two_make(zero, zero));
+    return chord;
+}
+
 // The ray through pixel (column, row). `row` is the same in all lanes.
 CLR_FN clr_medium_ray clr_aim(clr_medium s, CLR_GLOBAL const float* occluders, clr_uint column, clr_u32 row) {
-    const clr_real zero = (clr_real)(0.0f), middle = (clr_real)(0.5f), one = (clr_real)(1.0f);
+    const clr_real zero = (clr_real)(0.0f);
     clr_medium_ray ray;
-    const clr_real a = clr_fma(clr_to_real(clr_to_int(column)) + middle, (clr_real)(s.pixel[0]), -one);
-    const clr_real b = clr_fma((clr_real)((float)row) + middle, (clr_real)(-s.pixel[1]), one);
-    for (int k = 0; k < 3; ++k)
-        ray.direction[k] = clr_fma(b, (clr_real)(s.up[k]), clr_fma(a, (clr_real)(s.right[k]), (clr_real)(s.forward[k])));
-    const clr_real inverse = one / clr_sqrt(clr_dot(ray.direction, ray.direction));
-    for (int k = 0; k < 3; ++k) ray.direction[k] = ray.direction[k] * inverse;
-
-    const clr_span_of_ray box = clr_slabs(ray.direction, s.lo[0] - s.eye[0], s.lo[1] - s.eye[1], s.lo[2] - s.eye[2],
-                                          s.hi[0] - s.eye[0], s.hi[1] - s.eye[1], s.hi[2] - s.eye[2]);
-    const clr_real enter = clr_most(box.enter, zero);
-    const clr_real leave = clr_least(box.leave, clr_first_hit(s, occluders, ray.direction));
-    const clr_mask hit = leave > enter;
-    const clr_real start = hit ? enter : zero;
-    ray.length = hit ? leave - enter : zero;
+    clr_two to[3];
+    clr_real direction[3];
+    const clr_real across = clr_to_real(clr_to_int(column + column) + (clr_int)(1 - (int)s.width));
+    const clr_real above = (clr_real)((float)((int)s.height - 1 - 2 * (int)row));
     for (int k = 0; k < 3; ++k) {
-        const clr_real at = clr_fma(start, ray.direction[k], (clr_real)(s.eye[k]));
+        to[k] = clr_combine_axes(s.forward, across, s.right, above, s.up, k);
+        direction[k] = to[k].hi;
+    }
+    const clr_real size = clr_sqrt(clr_dot(direction, direction));
+    for (int k = 0; k < 3; ++k) ray.direction[k] = direction[k] / size;
+
+    clr_chord chord = clr_box_chord(s, to);
+    const clr_real stop = clr_first_hit(s, occluders, ray.direction) / size;
+    chord.leave = clr_choose(stop < chord.leave.hi, clr_two_make(stop, zero), chord.leave);
+    const clr_real span = (chord.leave.hi - chord.enter.hi) + (chord.leave.lo - chord.enter.lo);
+    const clr_mask hit = span > zero;
+    const clr_two start = clr_choose(hit, chord.enter, clr_two_make(zero, zero));
+    ray.length = hit ? span * size : zero;
+    for (int k = 0; k < 3; ++k) {
+        const clr_real rest = clr_fma(start.hi, to[k].lo, start.lo * to[k].hi);
+        const clr_real at = clr_fma(start.hi, to[k].hi, (clr_real)(s.eye[k])) + rest;
         ray.origin[k] = clr_clamp(at, (clr_real)(s.lo[k]), (clr_real)(s.hi[k]));
         ray.exit[k] =
             clr_fma((clr_real)(s.exit[k]) - ray.origin[k], (clr_real)(s.inverse_omega[k]), (clr_real)(s.beyond[k]));
