@@ -5,13 +5,14 @@
 #include <numbers>
 
 #include "draws.hpp"
+#include "medium_state.hpp"
 #include "scene.hpp"
 
 namespace clratio {
 namespace {
 
-constexpr std::uint32_t widest = 16;         // lanes
-constexpr double no_component = 1e-7;        // of the light's direction: below, float does not see it move
+constexpr std::uint32_t widest = 16;   // lanes
+constexpr double no_component = 1e-7;  // of the light's direction: below, float does not see it move
 
 void take(float (&to)[3], const Vector3& from) {
     for (std::size_t k = 0; k < 3; ++k) to[k] = static_cast<float>(from[k]);
@@ -120,8 +121,8 @@ void put_sphere(std::vector<float>& to, const Sphere& s, const Vector3& eye, con
     put(to, {dot(s.centre, light.across1), dot(s.centre, light.across2), dot(s.centre, light.omega), 0});
 }
 
-/// The shadow of a box in the coordinates g_k = p_k skew_k: a ray toward the light leaves the box's slab k at far_k - g_k and
-/// enters it at near_k - g_k, and must enter each before it leaves another.
+/// The shadow of a box in the coordinates g_k = p_k skew_k: a ray toward the light leaves the box's slab k at far_k - g_k
+/// and enters it at near_k - g_k, and must enter each before it leaves another.
 void put_box(std::vector<float>& to, const Box& box, const Vector3& eye, const Light& light) {
     for (const Vector3& corner : {box.lo, box.hi}) put(to, {corner[0] - eye[0], corner[1] - eye[1], corner[2] - eye[2]});
     Vector3 near{}, far{};
@@ -136,8 +137,7 @@ void put_box(std::vector<float>& to, const Box& box, const Vector3& eye, const L
         put(to, {bound ? near[i] - far[j] : -always, bound ? far[i] - near[j] : always});
     }
     put(to, {far[0], far[1], far[2]});
-    for (std::size_t k = 0; k < 3; ++k)
-        put(to, {light.moves[k] ? -2 * static_cast<double>(CLR_FAR) : near[k]});
+    for (std::size_t k = 0; k < 3; ++k) put(to, {light.moves[k] ? -2 * static_cast<double>(CLR_FAR) : near[k]});
 }
 
 std::vector<float> occluder_table(const Scene& scene, const Light& light) {
@@ -162,33 +162,24 @@ std::vector<float> share_planes(const Scene& scene, Frame frame, const device::c
 
 }  // namespace
 
-struct MediumScene::State {
-    State(const Engine& e, const Scene& s, Frame f, const Light& light)
-        : engine(e), scene(s), frame(f), device(describe(s, f, light)), occluders(occluder_table(s, light)),
-          shares(share_planes(s, f, device)),
-          occluder_buffer(Buffer::copy_of(e, std::as_bytes(std::span(occluders)))),
-          share_buffer(Buffer::copy_of(e, std::as_bytes(std::span(shares)))) {
-        for (std::uint32_t y = 0; y < frame.height; ++y) {
-            std::uint32_t hits = 0;
-            for (std::uint32_t x = 0; x < frame.width; ++x)
-                hits += device::clr_aim(device, occluders.data(), x, y).length > 0;
-            row_hits.push_back(hits);
-        }
+MediumScene::State::State(const Engine& e, const Scene& s, Frame f) : engine(e), scene(s), frame(f) {
+    const Light light(s.medium.light);
+    device = describe(s, f, light);
+    occluders = occluder_table(s, light);
+    shares = share_planes(s, f, device);
+    occluder_buffer = Buffer::copy_of(e, std::as_bytes(std::span(occluders)));
+    share_buffer = Buffer::copy_of(e, std::as_bytes(std::span(shares)));
+    for (std::uint32_t y = 0; y < frame.height; ++y) {
+        std::uint32_t hits = 0;
+        for (std::uint32_t x = 0; x < frame.width; ++x) hits += device::clr_aim(device, occluders.data(), x, y).length > 0;
+        row_hits.push_back(hits);
     }
-
-    Engine engine;
-    Scene scene;
-    Frame frame;
-    device::clr_medium device;
-    std::vector<float> occluders, shares;
-    Buffer occluder_buffer, share_buffer;
-    std::vector<std::uint32_t> row_hits;
-};
+}
 
 MediumScene::MediumScene(const Engine& engine, const Scene& scene, Frame frame) {
     check_scene(scene);
     check_frame(frame);
-    state_ = std::make_shared<State>(engine, scene, frame, Light(scene.medium.light));
+    state_ = std::make_shared<State>(engine, scene, frame);
 }
 
 const Engine& MediumScene::engine() const { return state_->engine; }
@@ -330,7 +321,8 @@ cl_event render(const MediumScene& scene, const Sampler& sampler, const Stream& 
     const std::uint64_t values = scene.values();
     if (sums.size() != values)
         throw InvalidArgument("sums", "a state of " + std::to_string(values) + " values", std::to_string(sums.size()));
-    if (&sums.engine().state() != &scene.engine().state()) throw InvalidArgument("sums", "a state on the scene's Engine", "another's");
+    if (&sums.engine().state() != &scene.engine().state())
+        throw InvalidArgument("sums", "a state on the scene's Engine", "another's");
     const Buffer m(scene.engine(), values * sizeof(float)), t(scene.engine(), values * sizeof(float));
     const Batch batch{{m.mem(), 0, values}, {t.mem(), 0, values}, static_cast<double>(samples)};
     const Event rendered(render(scene, sampler, stream, samples, Rows{}, batch.m, batch.t, wait_list));
@@ -348,17 +340,15 @@ std::vector<float> reference_image(const MediumScene& scene, Rows rows) {
 
 RenderedImages render(const MediumScene& scene, const Sampler& sampler, const Stream& stream, std::uint32_t samples,
                       Rows rows) {
-    return pair_onto_host(scene.engine(), scene.values(rows), [&](View m, View t) {
-        return render(scene, sampler, stream, samples, rows, m, t);
-    });
+    return pair_onto_host(scene.engine(), scene.values(rows),
+                          [&](View m, View t) { return render(scene, sampler, stream, samples, rows, m, t); });
 }
 
 RenderedImages render_levels(const MediumScene& scene, const Sampler& sampler, const Stream& stream, std::uint32_t levels,
                              Rows rows) {
     check_levels(levels);
-    return pair_onto_host(scene.engine(), scene.values(rows) * levels, [&](View m, View t) {
-        return render_levels(scene, sampler, stream, levels, rows, m, t);
-    });
+    return pair_onto_host(scene.engine(), scene.values(rows) * levels,
+                          [&](View m, View t) { return render_levels(scene, sampler, stream, levels, rows, m, t); });
 }
 
 RenderedPixel render_pixel(const MediumScene& scene, const Sampler& sampler, const Stream& stream, std::uint32_t samples,
@@ -369,7 +359,8 @@ RenderedPixel render_pixel(const MediumScene& scene, const Sampler& sampler, con
     check_samples(samples);
     if (x >= s.frame.width || y >= s.frame.height)
         throw InvalidArgument("pixel", "a column and a row of the frame", std::to_string(x) + ", " + std::to_string(y));
-    const auto sampling = static_cast<std::uint32_t>(sampler.sampling), generator = static_cast<std::uint32_t>(stream.generator);
+    const auto sampling = static_cast<std::uint32_t>(sampler.sampling),
+               generator = static_cast<std::uint32_t>(stream.generator);
     const std::uint32_t pixel = y * s.frame.width + x;
     const clr_sampler how = device_sampler(sampler, samples);
     const clr_stream own = scene_stream(stream);

@@ -238,7 +238,8 @@ struct MediumErrorSums {
 };
 
 /// Errors of images of seeds seeds.first .. and of `rows`, for the levels 1, 2, 4, .. samples. Index:
-/// ((seed * rows + row) * levels + level) * 6 + 3 * ratio + channel, counts without the first term; ratio = 0 for the mean of m, 1 for the ratio estimate.
+/// ((seed * rows + row) * levels + level) * 6 + 3 * ratio + channel, counts without the first term; ratio = 0 for the mean
+/// of m, 1 for the ratio estimate.
 struct MediumErrors {
     std::uint32_t levels = 0;
     IndexRange seeds;
