@@ -9,6 +9,7 @@
 #include "clratio/fit.hpp"
 #include "clratio/histogram.hpp"
 #include "clratio/law.hpp"
+#include "clratio/medium.hpp"
 #include "clratio/moments.hpp"
 #include "clratio/snapshot.hpp"
 #include "clratio/stream.hpp"

@@ -26,4 +26,15 @@ inline std::vector<Shape> all_shapes() {
     return shapes;
 }
 
+/// Both paths and four widths in six builds, for kernels that take seconds to build.
+inline std::vector<Shape> some_shapes() {
+    using Path = EngineOptions::Path;
+    return {{"ranges, width 1", {.width = 1, .path = Path::ranges}},
+            {"groups, width 4", {.width = 4, .path = Path::groups}},
+            {"ranges, width 8", {.width = 8, .path = Path::ranges}},
+            {"ranges, width 16", {.width = 16, .path = Path::ranges}},
+            {"7 work-items", {.width = 16, .path = Path::ranges, .work_items = 7}},
+            {"groups of 3", {.width = 1, .path = Path::groups, .work_items = 3}}};
+}
+
 }  // namespace clratio::test

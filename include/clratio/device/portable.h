@@ -28,6 +28,7 @@
 #define CLR_NAMESPACE_END
 #define CLR_FN static inline
 #define CLR_CONSTANT constant
+#define CLR_GLOBAL global
 #define CLR_JOIN_(a, b) a##b
 #define CLR_JOIN(a, b) CLR_JOIN_(a, b)
 
@@ -170,6 +171,7 @@ static inline clr_real clr_abs(clr_real x) { return (clr_real)(fabs(x.lo), fabs(
 #define CLR_NAMESPACE_END }
 #define CLR_FN inline
 #define CLR_CONSTANT constexpr
+#define CLR_GLOBAL
 
 CLR_NAMESPACE_BEGIN
 

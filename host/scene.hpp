@@ -1,0 +1,24 @@
+// What the two sides of `medium` share. Private to the library.
+#pragma once
+
+#include "clratio/medium.hpp"
+
+namespace clratio {
+
+Vector3 unit(const Vector3& v);
+
+/// The camera's axes: forward of length 1, right and up as long as half the image at distance 1.
+struct CameraAxes {
+    Vector3 forward, right, up;
+};
+CameraAxes axes_of(const Camera& camera, Frame frame);
+
+void check_frame(Frame frame);
+
+/// Rows with their count put in. Errors: InvalidArgument for rows outside the frame.
+Rows checked(Rows rows, Frame frame);
+
+/// The Henyey-Greenstein phase function.
+double phase_of(double g, double cosine);
+
+}  // namespace clratio
