@@ -7,6 +7,7 @@
 #include "clratio/estimator.hpp"
 #include "clratio/exception.hpp"
 #include "clratio/fit.hpp"
+#include "clratio/fixed.hpp"
 #include "clratio/histogram.hpp"
 #include "clratio/law.hpp"
 #include "clratio/medium.hpp"

@@ -129,17 +129,39 @@ typedef clr_wide clr_pairs;
 #define clr_even_lanes(x) clr_to_wide(x)
 #define clr_odd_lanes(x) ((clr_pairs)(0))
 #define clr_interleave(even, odd) clr_to_uint(even)
+#define clr_interleave_wide(even, odd) (even)
+#if CLR_WIDTH == 1
+#define clr_signed_pairs(x) as_long(x)
+#define clr_unsigned_pairs(x) as_ulong(x)
+#else
+#define clr_signed_pairs(x) CLR_JOIN(as_long, CLR_WIDTH)(x)
+#define clr_unsigned_pairs(x) CLR_JOIN(as_ulong, CLR_WIDTH)(x)
+#endif
 #else
 #if CLR_WIDTH == 8
 typedef ulong4 clr_pairs;
 #define clr_even_lanes(x) as_ulong4(x)
+#define clr_interleave_wide(even, odd)                                                                                      \
+    ((clr_wide)((even).s0, (odd).s0, (even).s1, (odd).s1, (even).s2, (odd).s2, (even).s3, (odd).s3))
+#define clr_signed_pairs(x) as_long4(x)
+#define clr_unsigned_pairs(x) as_ulong4(x)
 #else
 typedef ulong8 clr_pairs;
 #define clr_even_lanes(x) as_ulong8(x)
+#define clr_interleave_wide(even, odd)                                                                                      \
+    ((clr_wide)((even).s0, (odd).s0, (even).s1, (odd).s1, (even).s2, (odd).s2, (even).s3, (odd).s3, (even).s4, (odd).s4,    \
+                (even).s5, (odd).s5, (even).s6, (odd).s6, (even).s7, (odd).s7))
+#define clr_signed_pairs(x) as_long8(x)
+#define clr_unsigned_pairs(x) as_ulong8(x)
 #endif
 #define clr_odd_lanes(x) (clr_even_lanes(x) >> 32)
 #define clr_interleave(even, odd) CLR_JOIN(as_uint, CLR_WIDTH)(((even) & (clr_pairs)(0xffffffffUL)) | ((odd) << 32))
 #endif
+
+// Of the low halves, both with a sign; and a 64-bit lane with a sign shifted to the right.
+#define clr_signed_half(x) (clr_signed_pairs((x) << 32) >> 32)
+#define clr_signed_product(a, b) clr_unsigned_pairs(clr_signed_half(a) * clr_signed_half(b))
+#define clr_signed_shift(x, by) clr_unsigned_pairs(clr_signed_pairs(x) >> (by))
 
 #if CLR_WIDTH == 32
 static inline clr_real clr_fma(clr_real a, clr_real b, clr_real c) {
@@ -193,6 +215,11 @@ template <class T> clr_wide clr_to_wide(T x) { return static_cast<clr_wide>(x); 
 inline clr_pairs clr_even_lanes(clr_uint x) { return x; }
 inline clr_pairs clr_odd_lanes(clr_uint) { return 0; }
 inline clr_uint clr_interleave(clr_pairs even, clr_pairs) { return static_cast<clr_uint>(even); }
+inline clr_wide clr_interleave_wide(clr_pairs even, clr_pairs) { return even; }
+inline clr_pairs clr_signed_product(clr_pairs a, clr_pairs b) {
+    return static_cast<clr_pairs>(std::int64_t{static_cast<std::int32_t>(a)} * std::int64_t{static_cast<std::int32_t>(b)});
+}
+inline clr_pairs clr_signed_shift(clr_pairs x, int by) { return static_cast<clr_pairs>(static_cast<std::int64_t>(x) >> by); }
 template <class T> double clr_to_double(T x) { return static_cast<double>(x); }
 inline clr_uint clr_bits(float x) { return std::bit_cast<clr_uint>(x); }
 inline float clr_from_bits(clr_uint x) { return std::bit_cast<float>(x); }
