@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <limits>
 
 #include "clratio/device/fixed.h"
+#include "clratio/snapshot.hpp"
 #include "moments_state.hpp"
 
 namespace clratio {
@@ -35,14 +37,17 @@ using Counts = std::array<std::uint64_t, CLR_FIXED_TALLY>;
 float power(int exponent) { return std::ldexp(1.0f, exponent); }
 
 struct Shape {
+    const char* name;
     Plane plane;
     std::uint64_t limbs, bytes;  ///< of a value, and of a limb
 };
 
 std::vector<Shape> shapes_of(FixedOptions o) {
     using P = FixedPlanes;
-    std::vector<Shape> all{{&P::m, 1, 8}, {&P::t, 1, 8}, {&P::mm, 2, 8}, {&P::tt, 2, 8}, {&P::mt, 2, 8}};
-    if (o.nonfinite == NonFinite::skip) all.insert(all.end(), {{&P::weight, 1, 8}, {&P::batches, 1, 4}});
+    std::vector<Shape> all{
+        {"m", &P::m, 1, 8}, {"t", &P::t, 1, 8}, {"mm", &P::mm, 2, 8}, {"tt", &P::tt, 2, 8}, {"mt", &P::mt, 2, 8}};
+    if (o.nonfinite == NonFinite::skip)
+        all.insert(all.end(), {{"weight", &P::weight, 1, 8}, {"batches", &P::batches, 1, 4}});
     return all;
 }
 
@@ -154,6 +159,74 @@ std::uint64_t tally(const State& s, std::size_t which) {
     return sum_of(s.rows)[which];
 }
 
+// ---- snapshots
+
+using Settings = std::vector<std::pair<std::string, std::string>>;
+
+Settings settings_of(FixedOptions o) {
+    return {{"nonfinite", o.nonfinite == NonFinite::skip ? "skip" : "fail"},
+            {"resolution", std::to_string(o.resolution)},
+            {"range", std::to_string(o.range)}};
+}
+
+std::string text(const Settings& settings) {
+    std::string all;
+    for (const auto& [name, value] : settings) all += (all.empty() ? "" : " ") + name + "=" + value;
+    return all;
+}
+
+int number(const std::string& text) {
+    int n = -1;
+    std::from_chars(text.data(), text.data() + text.size(), n);
+    return n;
+}
+
+FixedOptions options_of(const Snapshot& snapshot) {
+    if (snapshot.kind != "fixed") throw InvalidArgument("snapshot", "kind fixed", snapshot.kind);
+    FixedOptions o;
+    for (const auto& [name, value] : snapshot.settings) {
+        if (name == "nonfinite" && value == "fail") o.nonfinite = NonFinite::fail;
+        if (name == "resolution") o.resolution = number(value);
+        if (name == "range") o.range = number(value);
+    }
+    if (settings_of(o) != snapshot.settings)
+        throw InvalidArgument("snapshot", "settings of a fixed state, as " + text(settings_of({})), text(snapshot.settings));
+    return o;
+}
+
+std::uint64_t words_of(const Shape& shape) { return shape.limbs * shape.bytes / sizeof(std::uint32_t); }
+
+std::string word_name(const Shape& shape, std::uint64_t word) {
+    return words_of(shape) == 1 ? shape.name : std::string(shape.name) + "." + std::to_string(word);
+}
+
+std::uint64_t weight_of(const Snapshot& snapshot, FixedOptions o) {
+    if (snapshot.groups.size() != 1) throw InvalidArgument("snapshot", "1 group", std::to_string(snapshot.groups.size()));
+    const auto& group = snapshot.groups.front();
+    const double weight = group.weight + group.weight_low;
+    const auto most = static_cast<double>(o.most_weight());
+    if (!(weight >= static_cast<double>(group.batches)) || weight > most || weight != std::floor(weight))
+        throw InvalidArgument("snapshot", "a whole weight from its batches up to " + std::to_string(o.most_weight()),
+                              std::to_string(weight));
+    return static_cast<std::uint64_t>(weight);
+}
+
+/// The words of the shape's planes, as they lie on the device: limb by limb, padded with zeros.
+std::vector<std::uint32_t> device_words(const Shape& shape, const Snapshot& snapshot, std::size_t first_plane) {
+    const std::uint64_t stride = Moments::plane_stride(snapshot.values), in_limb = words_of(shape) / shape.limbs;
+    std::vector<std::uint32_t> all(stride * words_of(shape));
+    for (std::uint64_t k = 0; k < words_of(shape); ++k) {
+        const auto& plane = snapshot.planes[first_plane + k];
+        if (plane.name != word_name(shape, k)) throw InvalidArgument("snapshot", "plane " + word_name(shape, k), plane.name);
+        if (plane.words.size() != snapshot.values)
+            throw InvalidArgument("snapshot plane " + plane.name, std::to_string(snapshot.values) + " values",
+                                  std::to_string(plane.words.size()));
+        for (std::uint64_t i = 0; i < snapshot.values; ++i)
+            all[(k / in_limb * stride + i) * in_limb + k % in_limb] = plane.words[i];
+    }
+    return all;
+}
+
 void check_target(const State& s, const Moments& into) {
     if (into.size() != s.values)
         throw InvalidArgument("moments", std::to_string(s.values) + " values", std::to_string(into.size()));
@@ -240,11 +313,8 @@ cl_event FixedMoments::merge(const FixedMoments& other, std::span<const cl_event
     State &a = *state_, &b = *other.state_;
     if (a.values != b.values) throw InvalidArgument("merge", std::to_string(a.values) + " values", std::to_string(b.values));
     if (&a.engine.state() != &b.engine.state()) throw InvalidArgument("merge", "a state on the same Engine", "another's");
-    const auto text = [](FixedOptions o) {
-        return "resolution " + std::to_string(o.resolution) + ", range " + std::to_string(o.range) +
-               (o.nonfinite == NonFinite::skip ? ", skip" : ", fail");
-    };
-    if (text(a.options) != text(b.options)) throw InvalidArgument("merge", text(a.options), text(b.options));
+    if (settings_of(a.options) != settings_of(b.options))
+        throw InvalidArgument("merge", text(settings_of(a.options)), text(settings_of(b.options)));
     check_room(a, b.batches, b.weight);
     Launch launch(a.engine, "fixed", "clr_merge_fixed");
     b.give_planes(a.give_planes(launch)).arg(a.rows).arg(b.rows).arg(a.rows.size() / sizeof(std::uint64_t));
@@ -315,6 +385,45 @@ std::vector<std::uint64_t> FixedMoments::limbs(Plane plane) const {
     }
     for (std::uint64_t limb = 0; limb < shape->limbs; ++limb) read(out.data() + limb * s.values, limb);
     return out;
+}
+
+Snapshot FixedMoments::snapshot() const {
+    const State& s = *state_;
+    Snapshot out{"fixed", s.values, settings_of(s.options), {}, negatives(), skipped(), {}};
+    const auto weight = device::clr_fixed_weight(s.weight);
+    out.groups.push_back({s.batches, weight.hi, weight.lo});
+    for (const Shape& shape : shapes_of(s.options)) {
+        const auto numbers = limbs(shape.plane);
+        for (std::uint64_t k = 0; k < words_of(shape); ++k) {
+            auto& words = out.planes.emplace_back(Snapshot::Plane{word_name(shape, k), {}}).words;
+            const auto* limb = numbers.data() + k / 2 * s.values;
+            for (std::uint64_t i = 0; i < s.values; ++i)
+                words.push_back(static_cast<std::uint32_t>(limb[i] >> (k % 2 * 32)));
+        }
+    }
+    return out;
+}
+
+FixedMoments::FixedMoments(const Engine& engine, const Snapshot& snapshot)
+    : FixedMoments(engine, snapshot.values, options_of(snapshot)) {
+    State& s = *state_;
+    s.weight = weight_of(snapshot, s.options);
+    s.batches = snapshot.groups.front().batches;
+    const auto shapes = shapes_of(s.options);
+    std::size_t planes = 0;
+    for (const Shape& shape : shapes) planes += words_of(shape);
+    if (snapshot.planes.size() != planes)
+        throw InvalidArgument("snapshot", std::to_string(planes) + " planes", std::to_string(snapshot.planes.size()));
+    planes = 0;
+    for (std::size_t i = 0; i < shapes.size(); ++i) {
+        const auto words = device_words(shapes[i], snapshot, planes);
+        s.memory[i].write(std::as_bytes(std::span(words)));
+        planes += words_of(shapes[i]);
+    }
+    Counts counts{};
+    counts[CLR_FIXED_TALLY_NEGATIVE] = snapshot.negatives;
+    counts[CLR_FIXED_TALLY_SKIPPED] = snapshot.skipped;
+    s.rows.write(std::as_bytes(std::span(counts)));
 }
 
 }  // namespace clratio

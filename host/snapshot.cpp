@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 
+#include "clratio/fixed.hpp"
 #include "moments_state.hpp"
 
 namespace clratio {
@@ -261,18 +262,16 @@ void append(Snapshot& to, const Snapshot& more) {
     to.skipped += more.skipped;
 }
 
-void merge(const Engine& engine, Snapshot& into, const Snapshot& more) {
+namespace {
+
+/// Slice by slice, so that the device holds little.
+template <class Kind> void merge_planes(const Engine& engine, Snapshot& into, const Snapshot& more) {
     constexpr std::uint64_t values_at_once = std::uint64_t{1} << 20;
-    if (into.values != more.values)
-        throw InvalidArgument("merge", std::to_string(into.values) + " values", std::to_string(more.values));
-    check_alike("merge", into, more);
-    check_words(into);
-    check_words(more);
     std::vector<Snapshot::Group> groups;
     for (std::uint64_t begin = 0; begin < into.values; begin += values_at_once) {
         const std::uint64_t count = std::min(values_at_once, into.values - begin);
-        Moments sum(engine, slice(into, begin, count));
-        sum.merge(Moments(engine, slice(more, begin, count)));
+        Kind sum(engine, slice(into, begin, count));
+        sum.merge(Kind(engine, slice(more, begin, count)));
         const Snapshot part = sum.snapshot();
         for (std::size_t p = 0; p < part.planes.size(); ++p)
             std::copy(part.planes[p].words.begin(), part.planes[p].words.end(),
@@ -280,6 +279,21 @@ void merge(const Engine& engine, Snapshot& into, const Snapshot& more) {
         groups = part.groups;
     }
     into.groups = groups;
+}
+
+}  // namespace
+
+void merge(const Engine& engine, Snapshot& into, const Snapshot& more) {
+    if (into.values != more.values)
+        throw InvalidArgument("merge", std::to_string(into.values) + " values", std::to_string(more.values));
+    check_alike("merge", into, more);
+    if (into.kind == "fixed") {
+        merge_planes<FixedMoments>(engine, into, more);
+    } else {
+        check_words(into);
+        check_words(more);
+        merge_planes<Moments>(engine, into, more);
+    }
     into.negatives += more.negatives;
     into.skipped += more.skipped;
 }

@@ -9,6 +9,7 @@
 
 #include "clratio/combine.hpp"
 #include "clratio/device/fixed.h"
+#include "clratio/snapshot.hpp"
 #include "embedded.hpp"
 #include "launch.hpp"
 #include "support/oclgrind.hpp"
@@ -618,7 +619,7 @@ TEST(Fixed, misuse_is_refused_by_name) {
     refused([&] { s.merge(FixedMoments(engine, values + 1)); }, "merge: expected 1003 values");
     refused([&] { s.merge(FixedMoments(another, values)); }, "same Engine");
     refused([&] { s.merge(FixedMoments(engine, values, {.resolution = 23})); },
-            "merge: expected resolution 24, range 16, skip");
+            "merge: expected nonfinite=skip resolution=24 range=16");
     refused([&] { s.add(std::span<const Batch>{}, {}); }, "batches");
     const Batch nowhere{{nullptr, 0, values}, {nullptr, 0, values}};
     refused([&] { s.add(std::span(&nowhere, 1), {}); }, "m: expected a device buffer, got null");
@@ -631,6 +632,69 @@ TEST(Fixed, misuse_is_refused_by_name) {
     refused([&] { Event(s.moments(ratios, {})); }, "moments: expected the fixed state's nonfinite policy");
     refused([&] { Event(s.moments(in_groups, {})); }, "one group");
     EXPECT_EQ(s.batches(), 0u);
+}
+
+// ---- snapshots
+
+TEST(Fixed, a_snapshot_goes_there_and_back_with_the_same_bits) {
+    const Engine engine({.width = 4}), another({.width = 16});
+    for (const NonFinite policy : {NonFinite::skip, NonFinite::fail}) {
+        const Input in = policy == NonFinite::skip ? spoiled(1, 5) : make_input(1, 5);
+        FixedMoments s(engine, values, {.nonfinite = policy});
+        s.add(batches_of(in));
+        const Snapshot snapshot = s.snapshot();
+        FixedMoments back(another, snapshot);
+        EXPECT_EQ(all_limbs(back), all_limbs(s));
+        EXPECT_EQ(back.snapshot(), snapshot);
+        EXPECT_EQ(back.weight(), s.weight());
+        EXPECT_EQ(back.negatives(), s.negatives());
+        EXPECT_EQ(back.skipped(), s.skipped());
+        EXPECT_EQ(snapshot.planes.size(), policy == NonFinite::skip ? 19u : 16u);
+        const auto& low = snapshot.planes[4];
+        EXPECT_EQ(low.name, "mm.0");
+        EXPECT_EQ(low.words[9], static_cast<std::uint32_t>(s.limbs(&FixedPlanes::mm)[9]));
+        back.add(batches_of(in));
+        s.merge(FixedMoments(engine, snapshot));
+        EXPECT_EQ(all_limbs(back), all_limbs(s));
+        Snapshot merged = snapshot;
+        merge(another, merged, snapshot);
+        EXPECT_EQ(merged, s.snapshot());
+    }
+}
+
+TEST(Fixed, snapshots_of_any_grouping_and_order_are_the_same) {
+    const Input in = spoiled(3, 45);
+    const Engine engine;
+    FixedMoments together(engine, values);
+    together.add(batches_of(in));
+    const Snapshot want = together.snapshot();
+    for (const std::uint64_t seed : {1, 2, 3}) {
+        Samples draw(seed);
+        for (const std::size_t parts : {3, 17, 40}) EXPECT_EQ(grouped(engine, in, parts, draw).snapshot(), want) << parts;
+    }
+}
+
+TEST(Fixed, a_snapshot_that_does_not_fit_together_is_refused_by_name) {
+    const Engine engine;
+    FixedMoments s(engine, values);
+    s.add(batches_of(make_input(1, 2)));
+    const Snapshot good = s.snapshot();
+    const auto spoilt = [&](auto change, const std::string& what) {
+        Snapshot bad = good;
+        change(bad);
+        refused([&] { FixedMoments(engine, bad); }, what);
+    };
+    spoilt([](Snapshot& x) { x.kind = "moments"; }, "kind fixed");
+    spoilt([](Snapshot& x) { x.settings[1].second = "23x"; }, "settings of a fixed state");
+    spoilt([](Snapshot& x) { x.settings[1].second = "49"; }, "resolution");
+    spoilt([](Snapshot& x) { x.settings.pop_back(); }, "settings of a fixed state");
+    spoilt([](Snapshot& x) { x.groups.push_back({}); }, "1 group");
+    spoilt([](Snapshot& x) { x.groups[0].weight = 0x1p23; }, "a whole weight");
+    spoilt([](Snapshot& x) { x.groups[0].weight_low = 0.5; }, "a whole weight");
+    spoilt([](Snapshot& x) { x.planes.pop_back(); }, "19 planes");
+    spoilt([](Snapshot& x) { std::swap(x.planes[0], x.planes[1]); }, "plane m.0");
+    spoilt([](Snapshot& x) { x.planes[3].words.pop_back(); }, "snapshot plane t.1: expected 1003 values");
+    refused([&] { Moments(engine, good); }, "kind moments");
 }
 
 // ---- long runs

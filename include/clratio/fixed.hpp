@@ -10,6 +10,8 @@
 
 namespace clratio {
 
+struct Snapshot;
+
 /// resolution + range is at least 16, so that Moments hold the weight exactly, and at most 48.
 struct FixedOptions {
     /// What a value does that fixed point cannot hold: NaN, infinite, or outside the range. skip or fail, as with Moments.
@@ -49,6 +51,8 @@ struct FixedPlanes {
 class FixedMoments {
 public:
     FixedMoments(const Engine& engine, std::uint64_t values, FixedOptions options = {});
+    /// The state that the snapshot was taken of, bit for bit. Errors: InvalidArgument where it does not fit together.
+    FixedMoments(const Engine& engine, const Snapshot& snapshot);
 
     static std::uint64_t state_bytes(std::uint64_t values, FixedOptions options = {});
 
@@ -87,6 +91,10 @@ public:
     /// The numbers of a plane in its own order, low limbs then high limbs without padding; empty where the state lacks it.
     std::vector<std::uint64_t> limbs(cl_mem FixedPlanes::*plane) const;
     FixedPlanes planes() const;
+
+    /// Blocking. As plain host data: kind "fixed", planes of 32-bit words "m.0" (low), "m.1", "t.0" .. "mm.0" to "mm.3" and
+    /// so on. It has one count of skipped values: outside() starts again at 0 in a state made from it.
+    Snapshot snapshot() const;
 
     struct State;
     State& state() const { return *state_; }

@@ -18,7 +18,7 @@ struct MomentsOptions;
 /// so on, group by group. Words are float32 bits in planes whose name ends in .hi or .lo, unsigned integers in all others.
 /// NaN: kept with its bits. Units: as the state's planes, see StatePlanes.
 struct Snapshot {
-    std::string kind;                                           ///< "moments" for Moments
+    std::string kind;                                           ///< "moments" for Moments, "fixed" for FixedMoments
     std::uint64_t values = 0;                                   ///< pixels x channels
     std::vector<std::pair<std::string, std::string>> settings;  ///< what two states must share to be merged
 
