@@ -233,12 +233,12 @@ std::vector<double> Sightline::breaks() const {
     return out;
 }
 
-std::vector<Interval> Sightline::lit() const {
+std::vector<Stretch> Sightline::lit() const {
     const State& s = *state_;
-    std::vector<Interval> out;
+    std::vector<Stretch> out;
     for (std::size_t i = 0; i + 1 < s.cuts.size(); ++i) {
         if (!s.lit[i] || s.cuts[i] == s.cuts[i + 1]) continue;
-        const Interval part{s.enter + s.cuts[i], s.enter + s.cuts[i + 1]};
+        const Stretch part{s.enter + s.cuts[i], s.enter + s.cuts[i + 1]};
         if (!out.empty() && out.back().hi == part.lo)
             out.back().hi = part.hi;
         else
