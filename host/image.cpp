@@ -37,7 +37,16 @@ void require_same_shape(const Image& a, const Image& b) {
 CombinedImage combined_image(Combined&& combined, const Image& like) {
     CombinedImage image;
     image.estimate = in_the_shape_of(like, std::move(combined.estimate));
-    if (!combined.standard_error.empty()) image.standard_error = in_the_shape_of(like, std::move(combined.standard_error));
+    const auto give = [&](Image& to, std::vector<float>& values) {
+        if (!values.empty()) to = in_the_shape_of(like, std::move(values));
+    };
+    give(image.standard_error, combined.standard_error);
+    give(image.bias, combined.bias);
+    give(image.lower, combined.lower);
+    give(image.upper, combined.upper);
+    give(image.gain, combined.gain);
+    give(image.needed, combined.needed);
+    image.kind = std::move(combined.kind);
     image.flag_image = std::move(combined.flag_image);
     image.flags = combined.flags;
     return image;

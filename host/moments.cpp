@@ -11,6 +11,8 @@ namespace {
 
 using device::clr_two;
 
+static_assert(most_groups == CLR_MOST_GROUPS);
+
 constexpr std::uint64_t widest = 32;  // lanes; planes are padded to it, so that kernels load and store whole vectors
 
 clr_two two_float(double x) {

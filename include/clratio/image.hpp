@@ -72,9 +72,11 @@ void require_same_shape(const Image& a, const Image& b);
 
 /// A read-out in the shape of an image.
 struct CombinedImage {
-    Image estimate, standard_error;
+    Image estimate, standard_error;  ///< without values where not asked for, like those below
     std::vector<std::uint32_t> flag_image;
     FlagCounts flags;
+    Image bias, lower, upper, gain, needed;
+    std::vector<std::uint32_t> kind;
 };
 /// Gives a read-out the windows, channels, alpha and metadata of `like`. Errors: none; the counts are the caller's to match.
 CombinedImage combined_image(Combined&& combined, const Image& like);

@@ -26,10 +26,12 @@ enum class Weights {
     reliability,  ///< how much it is trusted; all batches have the same variance. Records one more plane
 };
 
+inline constexpr std::uint32_t most_groups = 16;
+
 struct MomentsOptions {
     NonFinite nonfinite = NonFinite::skip;
     bool ratios = false;       ///< record what the mean of ratios and Hartley-Ross need: 6 more planes
-    std::uint32_t groups = 1;  ///< 1 to 16; batch k goes to group k mod groups, each a state of its own
+    std::uint32_t groups = 1;  ///< 1 to most_groups; batch k goes to group k mod groups, each a state of its own
     Weights weights = Weights::samples;
     bool operator==(const MomentsOptions&) const = default;
 };

@@ -20,6 +20,12 @@ template <class T> void append(std::vector<T>& to, const std::vector<T>& more) {
 void append(Combined& to, const Combined& more, bool flag_image) {
     append(to.estimate, more.estimate);
     append(to.standard_error, more.standard_error);
+    append(to.bias, more.bias);
+    append(to.lower, more.lower);
+    append(to.upper, more.upper);
+    append(to.kind, more.kind);
+    append(to.gain, more.gain);
+    append(to.needed, more.needed);
     if (flag_image) append(to.flag_image, more.flag_image);
     to.flags.zero_denominator += more.flags.zero_denominator;
     to.flags.zero_tau += more.flags.zero_tau;
@@ -36,10 +42,8 @@ std::uint64_t count_flagged(const std::vector<std::uint32_t>& flags, std::uint32
     return static_cast<std::uint64_t>(std::count_if(flags.begin(), flags.end(), [&](auto f) { return (f & counted) != 0; }));
 }
 
-CombineOptions plain_mean(CombineOptions options) {
-    options.estimator = clratio::Estimator::mean;
-    options.standard_error = false;
-    return options;
+CombineOptions plain_mean(const CombineOptions& options) {
+    return {.estimator = clratio::Estimator::mean, .zero = options.zero};
 }
 
 }  // namespace

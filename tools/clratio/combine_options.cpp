@@ -12,10 +12,18 @@ constexpr auto footer =
     R"(The estimate of each value (a channel of a pixel) is tau * mean(m) / mean(t) over the batches. m is what is
 rendered (shadowed light), t the same without what makes it hard (unshadowed light, the same samples), tau the exact t.
 
-Estimators:
+Estimators (docs/estimators.md says which one when):
   ratio           tau mean(m) / mean(t); its bias goes with 1/batches (default)
+  beale           the ratio with less bias; as the ratio, it stays in [0, tau] where 0 <= m <= t
+  tin             much like beale, but can leave [0, tau]
+  jackknife       the ratio with less bias, from --groups of batches; noisy with few
+  mickey          unbiased, from --groups of batches
+  hartley-ross    unbiased, from the ratios of single batches; suffers where t is small
+  regression      mean(m) - beta (mean(t) - tau); the least noise where there are many batches
+  crossfit-regression  the same, unbiased, with the slopes of the other --groups
   mean            mean(m), for comparison; tau and t are not used
   mean-of-ratios  mean of tau m / t of each batch, for comparison; keeps a bias that no number of batches removes
+With too few batches or groups, the ratio (the regressions: the mean) stands in, flagged.
 
 Where mean(t) is 0 although tau is not (--zero):
   mc-mean         the plain mean of m (default)
@@ -31,9 +39,20 @@ A NaN or an infinity in a batch (--nonfinite):
 Files: half, float or uint EXR; scanline, tiled or multi-part; all of one size, window and channels. FILE:LAYER names a
 layer in one file, --layer one for all; with one colour layer in the file it is found without asking. Alpha is taken
 from the first file of --m. The output is float, ZIP, with the windows and attributes of that file and the settings used.
---flags: a UINT for each value; 1 mean t is 0, 2 tau is 0, 4 batch skipped, 8 no data, 16 no error bar, 32 not finite.
---stderr: the standard error by the delta method; +inf with one batch. Without it a missing error bar is no flag that
---fail-on-flag looks at.
+--flags: a UINT for each value; 1 mean t is 0, 2 tau is 0, 4 batch skipped, 8 no data, 16 no error bar, 32 not finite,
+64 too few batches for the estimator, 128 the batches agree exactly and the interval has no width.
+--stderr: the standard error by the delta method (jackknife: its own); +inf with one batch. Without it a missing error bar
+is no flag that --fail-on-flag looks at.
+
+--interval LEVEL: a confidence interval of each value, --lower to --upper. --method fieller (default) belongs to the ratio
+and need not be bounded; --kind, a UINT, says what the two numbers mean: 0 between them, 1 all but what lies between them,
+2 everything. --method delta is the estimate -+ a multiple of its standard error, too narrow with few batches.
+--gain: the variance of the ratio over that of the plain mean, as the batches predict it: below 1 the ratio pays.
+--bias: of the ratio, as the batches predict it. --needed: how many more batches until the standard error is below --target
+(in units of m) or --relative-target (of the estimate); 0 where it is, inf where nothing is known.
+
+--weight: how many samples each batch is the mean of (or one number for all). --weights reliability takes them as trust
+instead: then all batches have the same variance, and error bars come out accordingly.
 
 --state FILE keeps the sums, so that more batches can be added later or elsewhere: nothing is read twice, no batch counts
 twice. A batch's index is --first-batch (0) plus its place in the list. With --resume the run goes on with FILE if it is
@@ -62,8 +81,21 @@ Examples:
   clratio combine --m m_*.exr --t t_*.exr --tau tau.exr -o out.exr --state sums.exr --resume
   clratio combine --watch renders --m "m_*.exr" --t "t_*.exr" --tau tau.exr -o out.exr --state sums.exr --resume)";
 
+/// Images beside the estimate: the option that asks for each, and its file.
+std::vector<std::pair<const char*, std::string>> extras(const Options& o) {
+    return {{"--stderr", o.standard_error},
+            {"--flags", o.flags},
+            {"--lower", o.lower},
+            {"--upper", o.upper},
+            {"--kind", o.kind},
+            {"--bias", o.bias},
+            {"--gain", o.gain},
+            {"--needed", o.needed}};
+}
+
 std::vector<std::string> outputs(const Options& options) {
-    std::vector<std::string> files{options.output, options.standard_error, options.flags, options.state};
+    std::vector<std::string> files{options.output, options.state};
+    for (const auto& [name, file] : extras(options)) files.push_back(file);
     files.erase(std::remove(files.begin(), files.end(), ""), files.end());
     return files;
 }
@@ -84,7 +116,29 @@ void require_different(const Options& options) {
 
 void require_error_bar(const Options& options) {
     if (!options.standard_error.empty() && options.estimator == "mean-of-ratios")
-        throw UsageError("--stderr: mean-of-ratios has no standard error; ratio and mean have one");
+        throw UsageError("--stderr: mean-of-ratios has no standard error; all others have one");
+    const bool ends = !options.lower.empty() || !options.upper.empty() || !options.kind.empty();
+    if (ends && !options.interval)
+        throw UsageError("--lower, --upper and --kind need --interval LEVEL, as in --interval .95");
+    if (options.interval && !(*options.interval > 0 && *options.interval < 1))
+        throw UsageError(fmt::format("--interval: expected a level between 0 and 1, got {}", *options.interval));
+    if (options.needed.empty() != (options.target <= 0 && options.relative_target <= 0))
+        throw UsageError("--needed goes with --target or --relative-target");
+}
+
+void require_groups(const Options& options) {
+    if (options.groups && (*options.groups < 1 || *options.groups > clratio::most_groups))
+        throw UsageError(fmt::format("--groups: expected 1 to {}, got {}", clratio::most_groups, *options.groups));
+    if (clratio::needs_of(options.chosen()).groups && options.groups == 1)
+        throw UsageError("--estimator " + options.estimator + " needs --groups of at least 2");
+}
+
+void require_weights(const Options& options) {
+    if (options.weight.size() > 1 && options.weight.size() != options.m.size())
+        throw UsageError(fmt::format("--weight: expected one number, or one for each of the {} batches, got {}",
+                                     options.m.size(), options.weight.size()));
+    for (const double w : options.weight)
+        if (!(w > 0) || !std::isfinite(w)) throw UsageError(fmt::format("--weight: expected numbers above 0, got {}", w));
 }
 
 void require_enough(const Options& options) {
@@ -95,11 +149,10 @@ void require_enough(const Options& options) {
     if (options.output.empty() && options.m.empty()) throw UsageError("--output is required where no batch is added");
     if (!options.output.empty() && options.tau.empty()) throw UsageError("--tau is required for an output");
     if (!options.output.empty()) return;
-    const std::vector<std::pair<const char*, bool>> needing{{"--stderr", !options.standard_error.empty()},
-                                                            {"--flags", !options.flags.empty()},
-                                                            {"--reference", !options.reference.empty()},
-                                                            {"--fail-on-flag", options.fail_on_flag},
-                                                            {"--until-error", options.until_error.has_value()}};
+    std::vector<std::pair<const char*, bool>> needing{{"--reference", !options.reference.empty()},
+                                                      {"--fail-on-flag", options.fail_on_flag},
+                                                      {"--until-error", options.until_error.has_value()}};
+    for (const auto& [name, file] : extras(options)) needing.emplace_back(name, !file.empty());
     for (const auto& [name, given] : needing)
         if (given) throw UsageError(std::string(name) + " needs --output: without it batches are added to --state, no more");
 }
@@ -123,6 +176,40 @@ void require_watch(const Options& options) {
 
 }  // namespace
 
+clratio::CombineOptions Options::combine() const {
+    clratio::CombineOptions o{.estimator = chosen(), .zero = zeros.at(zero)};
+    o.standard_error = !standard_error.empty() || until_error;
+    o.bias = !bias.empty();
+    o.interval = interval.has_value();
+    o.gain = !gain.empty();
+    o.needed = !needed.empty();
+    o.level = interval.value_or(o.level);
+    o.method = methods.at(method);
+    o.target = target;
+    o.relative_target = relative_target;
+    return o;
+}
+
+Wanted Options::wanted() const {
+    // A missing error bar is no defect of a run that asked for none, and batches that agree are none at all.
+    const std::uint32_t counted = ~(CLR_FLAG_NO_SPREAD | (standard_error.empty() ? CLR_FLAG_NO_ERROR_BAR : 0u));
+    return {combine(), !reference.empty(), !flags.empty(), counted};
+}
+
+clratio::MomentsOptions Options::moments() const {
+    const auto needs = clratio::needs_of(chosen());
+    constexpr std::uint32_t usual_groups = 8;
+    return {.nonfinite = nonfinites.at(nonfinite),
+            .ratios = needs.ratios,
+            .groups = groups.value_or(needs.groups ? usual_groups : 1),
+            .weights = weightings.at(weights)};
+}
+
+double Options::weight_of(std::uint64_t index) const {
+    if (weight.size() < 2) return weight.empty() ? 1 : weight.front();
+    return weight.at(index - first_batch);
+}
+
 void add_options(CLI::App& app, const std::shared_ptr<Options>& o) {
     CLI::App* const command = &app;
     const auto choice = [&](const char* name, std::string& value, const auto& map, const char* help) {
@@ -139,6 +226,26 @@ void add_options(CLI::App& app, const std::shared_ptr<Options>& o) {
     choice("--zero", o->zero, zeros, "What a zero denominator gives");
     choice("--nonfinite", o->nonfinite, nonfinites, "What a NaN or an infinity in a batch does")
         ->each([o](const std::string&) { o->nonfinite_given = true; });
+    command
+        ->add_option("--groups", o->groups, "Groups of batches for the estimators that need some (8, or those of --state)")
+        ->type_name("K");
+    command->add_option("--weight", o->weight, "Samples of each batch: one number, or one for each batch")->type_name("W");
+    choice("--weights", o->weights, weightings, "What a weight says")->each([o](const std::string&) {
+        o->weights_given = true;
+    });
+    command->add_option("--interval", o->interval, "A confidence interval of this level")->type_name("LEVEL");
+    choice("--method", o->method, methods, "How the interval is made");
+    const auto image = [&](const char* name, std::string& file, const char* help) {
+        command->add_option(name, file, help)->type_name("FILE");
+    };
+    image("--lower", o->lower, "Write the lower ends of the intervals");
+    image("--upper", o->upper, "Write the upper ends");
+    image("--kind", o->kind, "Write what the two ends mean: 0 between, 1 outside, 2 everything");
+    image("--gain", o->gain, "Write the predicted variance of the ratio over that of the plain mean");
+    image("--bias", o->bias, "Write the predicted bias of the ratio");
+    image("--needed", o->needed, "Write how many batches are still needed for the target");
+    command->add_option("--target", o->target, "Standard error to reach, in units of m")->type_name("E");
+    command->add_option("--relative-target", o->relative_target, "The same, as a share of the estimate")->type_name("R");
     command->add_option("--stderr", o->standard_error, "Also write the standard error of each value")->type_name("FILE");
     command->add_option("--flags", o->flags, "Also write the flags of each value")->type_name("FILE");
     command->add_option("--layer", o->layer, "The layer to read where a file names none")->type_name("NAME");
@@ -176,6 +283,8 @@ void check(const Options& options) {
     require_counts(options);
     require_different(options);
     require_error_bar(options);
+    require_groups(options);
+    require_weights(options);
     require_state(options);
     require_watch(options);
     for (const auto& file : outputs(options)) require_folder_of(file);

@@ -13,9 +13,15 @@
 
 namespace tool::combining {
 
-inline const std::map<std::string, clratio::Estimator> estimators{{"ratio", clratio::Estimator::ratio},
-                                                                  {"mean", clratio::Estimator::mean},
-                                                                  {"mean-of-ratios", clratio::Estimator::mean_of_ratios}};
+inline const std::map<std::string, clratio::Estimator> estimators = [] {
+    std::map<std::string, clratio::Estimator> names;
+    for (const auto e : clratio::all_estimators()) names[clratio::name_of(e)] = e;
+    return names;
+}();
+inline const std::map<std::string, clratio::IntervalMethod> methods{{"fieller", clratio::IntervalMethod::fieller},
+                                                                    {"delta", clratio::IntervalMethod::delta}};
+inline const std::map<std::string, clratio::Weights> weightings{{"samples", clratio::Weights::samples},
+                                                                {"reliability", clratio::Weights::reliability}};
 inline const std::map<std::string, clratio::Zero> zeros{
     {"mc-mean", clratio::Zero::mc_mean}, {"zero", clratio::Zero::zero}, {"one", clratio::Zero::one}};
 inline const std::map<std::string, clratio::NonFinite> nonfinites{
@@ -27,8 +33,16 @@ struct Options {
     std::string estimator = "ratio", zero = "mc-mean", nonfinite = "skip";
     bool fail_on_flag = false, json = false;
 
+    std::optional<std::uint32_t> groups;
+    std::vector<double> weight;  ///< none: 1 each; one: of all; else of each listed batch
+    std::string weights = "samples";
+
+    std::optional<double> interval;
+    std::string method = "fieller", lower, upper, kind, bias, gain, needed;
+    float target = 0, relative_target = 0;
+
     std::string state;
-    bool resume = false, nonfinite_given = false;
+    bool resume = false, nonfinite_given = false, weights_given = false;
     std::uint64_t first_batch = 0;
     double checkpoint = 30;  ///< seconds
 
@@ -37,18 +51,12 @@ struct Options {
     std::optional<std::uint64_t> until_batches;
     std::optional<double> until_error;
 
-    clratio::CombineOptions combine() const {
-        return {estimators.at(estimator), zeros.at(zero), !standard_error.empty() || until_error};
-    }
-    Wanted wanted() const {
-        // A missing error bar is no defect of a run that asked for none.
-        const std::uint32_t counted = ~std::uint32_t{standard_error.empty() ? CLR_FLAG_NO_ERROR_BAR : 0u};
-        return {combine(), !reference.empty(), !flags.empty(), counted};
-    }
+    clratio::Estimator chosen() const { return estimators.at(estimator); }
+    clratio::CombineOptions combine() const;
+    Wanted wanted() const;
     /// Of a state that is begun here.
-    clratio::MomentsOptions moments() const {
-        return {nonfinites.at(nonfinite), estimators.at(estimator) == clratio::Estimator::mean_of_ratios};
-    }
+    clratio::MomentsOptions moments() const;
+    double weight_of(std::uint64_t index) const;
 };
 
 /// Adds the options and the footer to the subcommand, which fills `options` when it is parsed.

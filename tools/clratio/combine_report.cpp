@@ -17,11 +17,22 @@ Json json_of(const Options& options, const Report& r) {
                {"no_data", r.flags.no_data},
                {"no_error_bar", r.flags.no_error_bar},
                {"nonfinite", r.flags.nonfinite},
+               {"fell_back", r.flags.fell_back},
+               {"no_spread", r.flags.no_spread},
                {"any", r.flags.any}}},
              {"negative_inputs", r.negatives},
              {"seconds", {{"decode", r.seconds.decode}, {"device", r.seconds.device}, {"encode", r.seconds.encode}}}};
     if (!options.state.empty())
         out["state"] = {{"file", options.state}, {"ranges", r.ranges}, {"held", r.held}, {"added", r.batches - r.held}};
+    if (r.intervals) {
+        const auto& [bounded, exclusive, whole] = r.intervals->kinds;
+        out["interval"] = {{"level", *options.interval},
+                           {"method", options.method},
+                           {"bounded", bounded},
+                           {"exclusive", exclusive},
+                           {"whole_line", whole}};
+        if (r.intervals->coverage) out["interval"]["coverage"] = *r.intervals->coverage;
+    }
     if (r.scores) {
         out["rmse"] = r.scores->estimate.rmse;
         out["bias"] = r.scores->estimate.bias;
@@ -47,6 +58,7 @@ void print_flags(const Options& options, const Report& r) {
     line(options.standard_error.empty() ? 0 : r.flags.no_error_bar,
          "no error bar: fewer than two batches, or a constant by the zero policy");
     line(r.flags.nonfinite, "the estimate is not finite");
+    line(r.flags.fell_back, "too few batches or groups for the estimator: the ratio or the mean stands there");
     line(r.negatives, "negative inputs (counted only)");
 }
 
@@ -59,6 +71,12 @@ void print_text(const Options& options, const Report& r) {
     fmt::print("{}: {} of {} batch{}, {}x{} pixels, {} channels, on {}\n", options.output, options.estimator, r.batches,
                r.batches == 1 ? "" : "es", r.shape.width(), r.shape.height(), r.shape.channels.size(), r.device);
     print_flags(options, r);
+    if (r.intervals) {
+        const auto& [bounded, exclusive, whole] = r.intervals->kinds;
+        fmt::print("{} intervals of level {}: {} bounded, {} exclusive, {} the whole line\n", options.method,
+                   *options.interval, bounded, exclusive, whole);
+        if (r.intervals->coverage) fmt::print("  {:.2f} % of the reference lies in them\n", 100 * *r.intervals->coverage);
+    }
     if (r.scores) {
         fmt::print("against {}\n  {:<15} {:>10} {:>12}\n", options.reference, "", "RMSE", "bias");
         fmt::print("  {:<15} {:>10.6f} {:>12.6f}\n", "plain mean", r.scores->mean.rmse, r.scores->mean.bias);

@@ -1,6 +1,7 @@
 // What clratio combine has to say at the end.
 #pragma once
 
+#include <array>
 #include <optional>
 
 #include "combine_options.hpp"
@@ -16,6 +17,11 @@ struct Scores {
     Difference estimate, mean;
 };
 
+struct Intervals {
+    std::array<std::uint64_t, 3> kinds{};  ///< bounded, exclusive, whole line
+    std::optional<double> coverage;        ///< share of the reference's values that lie in theirs
+};
+
 struct Report {
     std::string device;
     clratio::Image shape;  ///< of the first batch, without its values
@@ -26,6 +32,7 @@ struct Report {
     std::uint64_t flagged = 0;  ///< values with a flag that matters to this run
     Seconds seconds;
     std::optional<Scores> scores;
+    std::optional<Intervals> intervals;
 };
 
 Json json_of(const Options& options, const Report& report);

@@ -47,6 +47,20 @@ double root_mean_square(const std::vector<float>& errors) {
     return finite == 0 ? std::numeric_limits<double>::infinity() : std::sqrt(sum / static_cast<double>(finite));
 }
 
+/// How many intervals are of each kind, and in how many the reference lies.
+Intervals summary(const clratio::CombinedImage& out, const clratio::Image& reference) {
+    Intervals sum;
+    std::uint64_t covered = 0;
+    for (std::size_t i = 0; i < out.kind.size(); ++i) {
+        ++sum.kinds.at(out.kind[i]);
+        if (reference.values.empty()) continue;
+        const float x = reference.values[i], lower = out.lower.values[i], upper = out.upper.values[i];
+        covered += out.kind[i] == CLR_KIND_EXCLUSIVE ? x <= lower || x >= upper : x >= lower && x <= upper;
+    }
+    if (!reference.values.empty()) sum.coverage = static_cast<double>(covered) / static_cast<double>(out.kind.size());
+    return sum;
+}
+
 }  // namespace
 
 CombineRun::CombineRun(const Options& options)
@@ -81,7 +95,7 @@ std::vector<clratio::HostBatch> CombineRun::accept(const std::vector<Pair>& pair
             require_finite(pair.m);
             require_finite(pair.t);
         }
-        batches.push_back({pair.m, pair.t, 1, pair.index});
+        batches.push_back({pair.m, pair.t, options_.weight_of(pair.index), pair.index});
     }
     return batches;
 }
@@ -125,6 +139,7 @@ void CombineRun::write(ReadOut&& read_out) {
     report_.flags = out.flags;
     report_.flagged = read_out.flagged;
     report_.negatives = read_out.negatives;
+    if (options_.interval) report_.intervals = summary(out, reference_);
     rms_error_ = root_mean_square(out.standard_error.values);
     if (!options_.reference.empty()) {
         const auto mean = clratio::combined_image(std::move(read_out.mean), keeper_.shape());
@@ -133,8 +148,17 @@ void CombineRun::write(ReadOut&& read_out) {
     timed(report_.seconds.encode, [&] {
         const auto with = settings(options_, report_);
         clratio::write_image(options_.output, out.estimate, with);
-        if (!options_.standard_error.empty()) clratio::write_image(options_.standard_error, out.standard_error, with);
+        const auto image = [&](const std::string& file, const clratio::Image& values) {
+            if (!file.empty()) clratio::write_image(file, values, with);
+        };
+        image(options_.standard_error, out.standard_error);
+        image(options_.lower, out.lower);
+        image(options_.upper, out.upper);
+        image(options_.bias, out.bias);
+        image(options_.gain, out.gain);
+        image(options_.needed, out.needed);
         if (!options_.flags.empty()) clratio::write_flags(options_.flags, out.estimate, out.flag_image, with);
+        if (!options_.kind.empty()) clratio::write_flags(options_.kind, out.estimate, out.kind, with);
     });
 }
 

@@ -29,8 +29,14 @@ void require_fitting(const Options& options, const clratio::Snapshot& sums) {
                                   [&](const auto& entry) { return named(entry, recorded.nonfinite); });
     if (options.nonfinite_given && nonfinites.at(options.nonfinite) != recorded.nonfinite)
         refuse("--nonfinite " + options.nonfinite, "with --nonfinite " + was->first);
-    if (options.moments().ratios && !recorded.ratios)
-        refuse("--estimator " + options.estimator, "without what that needs; begin a state with this option");
+    const auto needs = clratio::needs_of(options.chosen());
+    const std::string without = "without what that needs; begin a state with this option";
+    if (needs.ratios && !recorded.ratios) refuse("--estimator " + options.estimator, without);
+    if (needs.groups && recorded.groups < 2) refuse("--estimator " + options.estimator, without + " or with --groups");
+    if (options.groups && *options.groups != recorded.groups)
+        refuse(fmt::format("--groups {}", *options.groups), fmt::format("with --groups {}", recorded.groups));
+    if (options.weights_given && weightings.at(options.weights) != recorded.weights)
+        refuse("--weights " + options.weights, "with the other kind");
 }
 
 }  // namespace
