@@ -323,7 +323,7 @@ TEST(MediumDevice, visibility_agrees_with_the_exact_intervals) {
                 }
                 if (near) continue;
                 ++tested;
-                EXPECT_EQ(device::clr_lit(twin.state.device, twin.state.occluders.data(), &shadows, x), inside);
+                EXPECT_EQ(device::clr_lit(twin.state.device, twin.state.occluders.data(), &shadows, x), inside ? 1 : 0);
             }
         }
     }
