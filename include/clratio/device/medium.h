@@ -447,16 +447,14 @@ CLR_FN clr_medium_plan clr_make_plan(clr_u32 sampling, clr_medium s, const clr_m
         for (int c = 0; c < 3; ++c) plan.scale[c] = plan.scale[c] * (clr_real)(s.inverse_sigma_mean);
     }
     if (sampling == CLR_DSM) {
-        clr_real from = zero;
-        const clr_real share = clr_inverse_or_zero(sum);
+        const clr_real third = (clr_real)(0.33333334f);
         for (int c = 0; c < 3; ++c) {
-            const clr_real part = ray->tau[c] * share;
             const clr_real z = clr_most((clr_real)(s.sigma[c]) * ray->length, (clr_real)(CLR_LEAST_RISE));
-            plan.depth[c][0] = clr_depth_line(from, part, z, never);
-            from = from + part;
-            if (c < 2) plan.channel_from[c] = from;
-            plan.low[c] = part * clr_inverse_or_zero(ray->length * (clr_decayed(z) / z));
+            plan.depth[c][0] = clr_depth_line((clr_real)((float)c) * third, third, z, never);
+            plan.low[c] = third * clr_inverse_or_zero(ray->length * (clr_decayed(z) / z));
         }
+        plan.channel_from[0] = third;
+        plan.channel_from[1] = third + third;
     }
     if (sampling == CLR_WVDS_MEAN || sampling == CLR_WVDS_MIN) {
         const float sigma = sampling == CLR_WVDS_MEAN ? s.sigma_mean : clr_least_sigma(s);
