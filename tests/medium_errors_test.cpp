@@ -390,8 +390,8 @@ TEST(MediumErrors, claim_3_one_ratio_sample_against_ray_marching) {
     }
 }
 
-// Root mean squared errors x 1000 as docs/medium.md has them, at N = 1, 2, .. 64, which 16 seeds of 80 x 60 pixels give to about 3
-// %.
+// Root mean squared errors x 1000 at N = 1, 2, .. 64, from 16 seeds of 80 x 60 pixels of a prototype in NumPy, in double and
+// with another hash.
 TEST(MediumErrors, SlowTheWholeTable) {
     using Row = std::array<double, 7>;
     const Sampler march{Sampling::uni, Pattern::stratified, false}, uni{Sampling::uni}, ds{Sampling::ds}, dsa{Sampling::dsa},

@@ -121,7 +121,7 @@ public:
     bool stopped() const;  ///< by an occluder
     Rgb tau() const, mu() const;
     std::vector<double> breaks() const;    ///< where phi bends
-    std::vector<Stretch> lit() const;     ///< the parts that see the light
+    std::vector<Stretch> lit() const;      ///< the parts that see the light
     double exit_distance(double s) const;  ///< from the point at s toward the light to the end of the medium
 
     SecondMoments second_moments(Sampling sampling) const;
