@@ -47,16 +47,6 @@ struct Light {
     std::array<bool, 3> moves{};
 };
 
-/// Channels by sigma_t, those without light last.
-std::array<std::size_t, 3> channel_order(const Medium& m) {
-    std::array<std::size_t, 3> order{0, 1, 2};
-    const auto dark = [&](std::size_t c) { return m.sigma_s[c] * m.irradiance[c] == 0; };
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-        return dark(a) != dark(b) ? dark(b) : m.sigma_t[a] < m.sigma_t[b];
-    });
-    return order;
-}
-
 void take_channels(device::clr_medium& d, const Medium& m) {
     const auto order = channel_order(m);
     for (std::size_t c = 0; c < 3; ++c) {

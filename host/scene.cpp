@@ -111,6 +111,15 @@ void check_scene(const Scene& scene) {
     for (std::size_t i = 0; i < scene.boxes.size(); ++i) check_box("boxes[" + std::to_string(i) + "]", scene.boxes[i]);
 }
 
+std::array<std::size_t, 3> channel_order(const Medium& m) {
+    std::array<std::size_t, 3> order{0, 1, 2};
+    const auto dark = [&](std::size_t c) { return m.sigma_s[c] * m.irradiance[c] == 0; };
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+        return dark(a) != dark(b) ? dark(b) : m.sigma_t[a] < m.sigma_t[b];
+    });
+    return order;
+}
+
 Scene gray(Scene scene) {
     auto& sigma = scene.medium.sigma_t;
     sigma.fill((sigma[0] + sigma[1] + sigma[2]) / 3);

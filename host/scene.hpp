@@ -18,6 +18,9 @@ void check_frame(Frame frame);
 /// Rows with their count put in. Errors: InvalidArgument for rows outside the frame.
 Rows checked(Rows rows, Frame frame);
 
+/// Channels by sigma_t, those without light last: the order in which mixtures and kernels take them.
+std::array<std::size_t, 3> channel_order(const Medium& medium);
+
 /// The Henyey-Greenstein phase function.
 double phase_of(double g, double cosine);
 

@@ -118,6 +118,7 @@ struct Sightline::State {
     std::vector<bool> lit;                         // between cuts
     Rgb sigma{}, strength{}, area{}, tau{}, mu{};  // strength: what one lit unit of length sends to the camera
     double mean = 0, least = 0;
+    std::array<std::size_t, 3> order{};  // of channels in mixtures
 
     double exit_distance(double x) const {
         double d = infinity;
@@ -146,7 +147,7 @@ struct Sightline::State {
     void find_pieces();
     void find_shadows(const Ray& local, const Scene& scene, const Vector3& omega);
     double depth_inverse(double sigma, double u) const;
-    Rgb shares() const;
+    Rgb shares(Sampling sampling) const;
     double mixture_density(Sampling sampling, double x) const;
     double mixture_moment(Sampling sampling, std::size_t channel, bool only_lit) const;
 };
@@ -208,6 +209,7 @@ Sightline::Sightline(const Scene& scene, const Ray& ray) {
     s->find_pieces();
     s->find_shadows(local, scene, omega);
     s->sigma = medium.sigma_t;
+    s->order = channel_order(medium);
     s->mean = std::accumulate(s->sigma.begin(), s->sigma.end(), 0.0) / 3;
     s->least = *std::min_element(s->sigma.begin(), s->sigma.end());
     for (std::size_t c = 0; c < 3; ++c) {
@@ -262,13 +264,15 @@ double Sightline::State::depth_inverse(double s, double u) const {
     return length;
 }
 
-Rgb Sightline::State::shares() const {
+// How often a mixture takes each channel.
+Rgb Sightline::State::shares(Sampling sampling) const {
+    if (sampling == Sampling::dsm) return {1.0 / 3, 1.0 / 3, 1.0 / 3};
     const double sum = tau[0] + tau[1] + tau[2];
     return {tau[0] / sum, tau[1] / sum, tau[2] / sum};
 }
 
 double Sightline::State::mixture_density(Sampling sampling, double x) const {
-    const Rgb q = shares();
+    const Rgb q = shares(sampling);
     double p = 0;
     for (std::size_t j = 0; j < 3; ++j)
         p += sampling == Sampling::dsm ? q[j] * std::exp(-sigma[j] * x) / (length * decay_mean(sigma[j] * length))
@@ -342,11 +346,16 @@ double Sightline::distance(Sampling sampling, double u) const {
     case Sampling::wvds_mis:
         break;
     }
-    const Rgb q = s.shares();
-    const std::size_t c = u < q[0] ? 0 : u < q[0] + q[1] ? 1 : 2;
-    const double from = c == 0 ? 0 : c == 1 ? q[0] : q[0] + q[1];
-    const double within = std::clamp((u - from) / q[c], 0.0, 1.0);
-    return s.enter + (sampling == Sampling::dsm ? truncated(s.sigma[c], within) : s.depth_inverse(s.sigma[c], within));
+    const Rgb q = s.shares(sampling);
+    double within = u;
+    for (const std::size_t c : s.order) {
+        if (within < q[c] || c == s.order.back()) {
+            const double v = std::clamp(within / q[c], 0.0, 1.0);
+            return s.enter + (sampling == Sampling::dsm ? truncated(s.sigma[c], v) : s.depth_inverse(s.sigma[c], v));
+        }
+        within -= q[c];
+    }
+    return leave();
 }
 
 Prediction predict(double mu, double tau, double mm, double tt, std::uint64_t n) {

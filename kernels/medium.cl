@@ -68,9 +68,11 @@ kernel void clr_medium_render(global float* m, clr_layout m_layout, global float
         const clr_medium_plan plan = clr_make_plan(CLR_SAMPLING, s, &ray);
         clr_find_shadows(s, occluders, &ray, &shadows);
         clr_medium_sums sums = clr_no_samples(), others = clr_no_samples();
+        const int some_hit = clr_any(ray.length > (clr_real)(0.0f));
         const uint steps = clr_step_count(sampler, levels);
         for (uint k = 0; k < steps; ++k) {
-            const clr_step step = clr_step_of(sampler, levels, k);
+            clr_step step = clr_step_of(sampler, levels, k);
+            if (!some_hit) step.from = step.to;
             sums = clr_do_step(step, CLR_GENERATOR, CLR_SAMPLING, s, occluders, &ray, &plan, &shadows, stream, p.pixel, sums);
 #if CLR_INDEPENDENT_T
             others =

@@ -135,3 +135,74 @@ TEST(Medium, scenes_have_the_vectors_sums_and_pixels) {
         near_in_units(line.leave(), j.at("s1"), 10, name);
     }
 }
+
+TEST(Medium, a_gray_scene_has_the_mean_extinction) {
+    const Scene scene = gray(scenes()[3]);
+    for (const double s : scene.medium.sigma_t) EXPECT_DOUBLE_EQ(s, 14.0 / 3);
+    EXPECT_EQ(scene.medium.sigma_s, scenes()[3].medium.sigma_s);
+}
+
+TEST(Medium, names_go_there_and_back) {
+    for (const Sampling s : all_samplings) EXPECT_EQ(sampling_of(name_of(s)), s);
+    for (const Pattern p : {Pattern::iid, Pattern::stratified, Pattern::offset}) EXPECT_EQ(pattern_of(name_of(p)), p);
+    refused([] { sampling_of("wvds"); }, "wvds-mis");
+    refused([] { pattern_of("sobol"); }, "stratified");
+}
+
+TEST(Medium, predictions_are_their_formulas) {
+    // One sample that is 3 with probability 1/2, half of these lit: mu = .75, tau = 1.5, E[m^2] = 2.25, E[t^2] = 4.5.
+    const Prediction p = predict(.75, 1.5, 2.25, 4.5, 2);
+    EXPECT_DOUBLE_EQ(p.plain_mse, (2.25 - .5625) / 2);
+    EXPECT_DOUBLE_EQ(p.ratio_mse, .25 * 4.5 / 2);
+    EXPECT_DOUBLE_EQ(p.ratio_bias, 0);
+    EXPECT_DOUBLE_EQ(p.independent_mse, (1.6875 + .25 * 2.25) / 2);
+    EXPECT_DOUBLE_EQ(p.independent_bias, .5 * 2.25 / (2 * 1.5));
+    EXPECT_EQ(predict(0, 0, 0, 0, 1).ratio_bias, 0);
+}
+
+TEST(Medium, rays_that_miss_have_no_answer) {
+    const Sightline line(scenes()[2], {{0, 0, -9}, {0, 1, 0}});
+    EXPECT_FALSE(line.hit());
+    EXPECT_EQ(line.tau(), (Rgb{}));
+    EXPECT_EQ(line.second_moments(Sampling::wvds_mis).mm, (Rgb{}));
+    refused([] { Sightline(scenes()[2], {{0, 0, -9}, {0, 0, 0}}); }, "ray");
+}
+
+TEST(Medium, bad_scenes_are_refused_by_field) {
+    const double nan = std::nan("");
+    const auto refuse = [](const std::string& field, auto change) {
+        Scene scene = scenes()[3];
+        change(scene);
+        refused([&] { check_scene(scene); }, "scene: " + field);
+    };
+    refuse("medium.box.hi", [](Scene& s) { s.medium.box.hi[1] = s.medium.box.lo[1]; });
+    refuse("medium.box.lo", [=](Scene& s) { s.medium.box.lo[0] = nan; });
+    refuse("medium.sigma_t", [](Scene& s) { s.medium.sigma_t[2] = 0; });
+    refuse("medium.sigma_s", [](Scene& s) { s.medium.sigma_s[0] = -1; });
+    refuse("medium.irradiance", [](Scene& s) { s.medium.irradiance = {0, 0, 0}; });
+    refuse("medium.irradiance", [=](Scene& s) { s.medium.irradiance[1] = nan; });
+    refuse("medium.g", [](Scene& s) { s.medium.g = 1; });
+    refuse("medium.light", [](Scene& s) { s.medium.light = {0, 0, 0}; });
+    refuse("camera.eye", [](Scene& s) { s.camera.eye[0] = INFINITY; });
+    refuse("camera.at", [](Scene& s) { s.camera.at = s.camera.eye; });
+    refuse("camera.at", [](Scene& s) { s.camera.at = {s.camera.eye[0], 5, s.camera.eye[2]}; });
+    refuse("camera.fov_y", [](Scene& s) { s.camera.fov_y = 180; });
+    refuse("spheres[0].radius", [](Scene& s) { s.spheres[0].radius = 0; });
+    refuse("spheres[0].centre", [=](Scene& s) { s.spheres[0].centre[2] = nan; });
+    refuse("boxes[0].hi", [](Scene& s) { s.boxes[0].hi[0] = -5; });
+    refuse("spheres", [](Scene& s) { s.spheres.resize(257, {{0, 0, 0}, 1}); });
+    for (const Scene& good : scenes()) EXPECT_NO_THROW(check_scene(good));
+    refused([] { exact_image(scenes()[0], {70000, 1}); }, "frame");
+}
+
+// The oracle of the vectors can fail: a brighter sun, a bent ray.
+TEST(Medium, the_vectors_catch_planted_faults) {
+    const auto& j = medium_vectors().at("cases")[0];
+    const double tau = j.at("A_unoccluded")[1];
+    Scene bright = case_scene(j);
+    bright.medium.irradiance[1] *= 1 + 1e-11;
+    EXPECT_GT(std::abs(Sightline(bright, {j.at("origin"), j.at("dir")}).tau()[1] / tau - 1), vector_tolerance);
+    Vector3 bent = j.at("dir");
+    bent[0] += 1e-11;
+    EXPECT_GT(std::abs(Sightline(case_scene(j), {j.at("origin"), bent}).tau()[1] / tau - 1), vector_tolerance);
+}

@@ -67,7 +67,7 @@ peers() {
     device=$("$build/clratio" devices --json | "$python" -c 'import json, sys
 all = json.load(sys.stdin)
 print(next(d["name"] for d in all["devices"] if d["id"] == all["picked"]))')
-    for peer in numpy pyopencl mkl; do
+    for peer in numpy numpy_medium pyopencl mkl; do
         say "Running $peer ..."
         "$python" "bench/peers/${peer}_peer.py" "$repetitions" "$device" >"$results/$peer.json" 2>"$results/$peer.log" ||
             say "  failed: see $results/$peer.log"

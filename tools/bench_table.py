@@ -38,6 +38,7 @@ def rows():
     yield from error_rows()
     yield from histogram_rows()
     yield from stream_rows()
+    yield from medium_rows()
     yield from memory_rows()
     for law in ("pdf", "cdf"):
         yield Row(f"exact law, {law}, float", ("law", f"device/{law}"), peers={"host, one core, double": ("law", f"host/{law}")})
@@ -63,6 +64,17 @@ def histogram_rows():
     yield Row("error histogram, fused, double, philox", ("histogram", "one_model_double/philox"))
     yield Row("histogram of values in memory", ("histogram", "values_in_memory"),
               peers={"NumPy x cores": ("numpy", "histogram")})
+
+
+def medium_rows():
+    numpy = {"NumPy x cores": ("numpy_medium", "wvds_mis")}
+    yield Row("scene samples, WVDS-MIS, philox (limit without set-up)", ("medium", "image/wvds_mis_philox"),
+              ("medium", "native/wvds_mis_philox"), 0.8, numpy, ("NumPy x cores", 10))
+    yield Row("scene samples, WVDS-MIS, pcg4d3x", ("medium", "image/wvds_mis_pcg4d3x"))
+    for sampling in ("uni", "ds", "dsa", "dsm", "wvds_mean", "wvds_min"):
+        yield Row(f"scene samples, {sampling.replace('_', '-')}, philox", ("medium", f"image/{sampling}_philox"))
+    for sampling in ("uni", "wvds_mis"):
+        yield Row(f"scene errors, fused, {sampling.replace('_', '-')}, philox", ("medium", f"errors/{sampling}_philox"))
 
 
 def stream_rows():
@@ -105,7 +117,7 @@ class Results:
             content = self.load(path)
             if "benchmarks" in content:
                 self.add_benchmarks(path.stem, content["benchmarks"])
-            elif path.stem in ("numpy", "pyopencl", "mkl"):
+            elif path.stem in ("numpy", "numpy_medium", "pyopencl", "mkl"):
                 self.add_peer(path.stem, content)
         self.start = self.load(self.folder / "start.json")
         self.devices = self.load(self.folder / "devices.json")

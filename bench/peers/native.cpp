@@ -1,4 +1,5 @@
 #include "native.hpp"
+#include "native_medium.hpp"
 
 #include <algorithm>
 #include <mutex>
@@ -44,6 +45,13 @@ void native_histogram(const NativeSet& set, const clratio::Canonical& law, const
         set.histogram(clratio::to_float(law), stream, first + begin, part, binning, row.data());
         const std::scoped_lock lock(mutex);
         for (std::size_t i = 0; i < row.size(); ++i) totals[i] += row[i];
+    });
+}
+
+void native_medium(const NativeSet& set, const clratio::device::clr_medium& scene, const std::vector<MediumPixels>& pixels,
+                   const clratio::Stream& stream, std::uint32_t samples, std::vector<MediumSums>& out) {
+    on_all_cores(pixels.size() * step, [&](std::uint64_t begin, std::uint64_t count) {
+        set.medium(scene, pixels.data() + begin / step, count / step, stream, samples, out.data() + begin / step);
     });
 }
 

@@ -6,6 +6,7 @@
 #include <span>
 
 #include "clratio/error.hpp"
+#include "clratio/medium.hpp"
 
 namespace peers {
 
@@ -14,6 +15,9 @@ struct Binning {
     std::uint32_t bins;
 };
 
+struct MediumPixels;
+struct MediumSums;
+
 /// One thread's work in one instruction set. first and count are multiples of 32; row has bins + 3 counters.
 struct NativeSet {
     const char* name;
@@ -21,6 +25,9 @@ struct NativeSet {
                     float* out);
     void (*histogram)(clratio::device::clr_canonical law, clratio::Stream stream, std::uint64_t first, std::uint64_t count,
                       Binning binning, std::uint32_t* row);
+    void (*medium)(const clratio::device::clr_medium& scene, const MediumPixels* pixels, std::size_t count,
+                   clratio::Stream stream, std::uint32_t samples, MediumSums* out);  ///< see native_medium.hpp
+    std::size_t lanes;
 };
 extern const NativeSet native_avx2, native_avx512;
 

@@ -36,6 +36,17 @@ struct V {
     static F from_bits(U a) { return _mm256_castsi256_ps(a); }
     static F from_signed(U a) { return _mm256_cvtepi32_ps(a); }
 
+    using M = __m256;
+    static F add(F a, F b) { return _mm256_add_ps(a, b); }
+    static F min(F a, F b) { return _mm256_min_ps(a, b); }
+    static F max(F a, F b) { return _mm256_max_ps(a, b); }
+    static F load(const float* p) { return _mm256_load_ps(p); }
+    static void store(F a, float* p) { _mm256_store_ps(p, a); }
+    static M ge(F a, F b) { return _mm256_cmp_ps(a, b, _CMP_GE_OQ); }
+    static M both(M a, M b) { return _mm256_and_ps(a, b); }
+    static F blend(F a, F b, M from_b) { return _mm256_blendv_ps(a, b, from_b); }
+    static F where_zero(U e, F a, F b) { return blend(b, a, from_bits(_mm256_cmpeq_epi32(e, set_word(0)))); }
+
     // 2^39 + high half and 2^23 + low half are exact; their sum is rounded once.
     static F from_unsigned(U a) {
         const F low = from_bits(_mm256_blend_epi16(a, set_word(0x4b000000u), 0xaa));
@@ -64,6 +75,7 @@ struct V {
 
 }  // namespace
 
-const NativeSet native_avx2{"AVX2", NativeKernels<V>::samples, NativeKernels<V>::histogram};
+const NativeSet native_avx2{"AVX2", NativeKernels<V>::samples, NativeKernels<V>::histogram, NativeKernels<V>::medium,
+                            V::lane_count};
 
 }  // namespace peers

@@ -37,6 +37,17 @@ struct V {
     static F from_unsigned(U a) { return _mm512_cvtepu32_ps(a); }
     static F from_signed(U a) { return _mm512_cvtepi32_ps(a); }
 
+    using M = __mmask16;
+    static F add(F a, F b) { return _mm512_add_ps(a, b); }
+    static F min(F a, F b) { return _mm512_min_ps(a, b); }
+    static F max(F a, F b) { return _mm512_max_ps(a, b); }
+    static F load(const float* p) { return _mm512_load_ps(p); }
+    static void store(F a, float* p) { _mm512_store_ps(p, a); }
+    static M ge(F a, F b) { return _mm512_cmp_ps_mask(a, b, _CMP_GE_OQ); }
+    static M both(M a, M b) { return _kand_mask16(a, b); }
+    static F blend(F a, F b, M from_b) { return _mm512_mask_blend_ps(from_b, a, b); }
+    static F where_zero(U e, F a, F b) { return _mm512_mask_blend_ps(_mm512_testn_epi32_mask(e, e), b, a); }
+
     static void store_in_turn(F even, F odd, float* out) {
         const U low = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
         const U high = _mm512_setr_epi32(8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
@@ -58,6 +69,7 @@ struct V {
 
 }  // namespace
 
-const NativeSet native_avx512{"AVX-512", NativeKernels<V>::samples, NativeKernels<V>::histogram};
+const NativeSet native_avx512{"AVX-512", NativeKernels<V>::samples, NativeKernels<V>::histogram, NativeKernels<V>::medium,
+                              V::lane_count};
 
 }  // namespace peers

@@ -1,9 +1,11 @@
 // Written on V: a vector of floats (V::F), of 32-bit words (V::U) and of 64-bit lanes (V::U, half as many).
 #pragma once
 
+#include <algorithm>
 #include <array>
 
 #include "native.hpp"
+#include "native_medium.hpp"
 
 namespace peers {
 
@@ -53,7 +55,8 @@ template <class V> struct NativeKernels {
     /// Rounds on 64-bit lanes whose high halves are never cleared, the even and the odd lanes side by side; the round keys
     /// are spread over the lanes once.
     struct Philox {
-        explicit Philox(const clratio::Stream& stream) : id(V::set_word(stream.id)), domain(V::set_word(CLR_DOMAIN_ERROR)) {
+        explicit Philox(const clratio::Stream& stream, std::uint32_t of_domain = CLR_DOMAIN_ERROR)
+            : id(V::set_word(stream.id)), domain(V::set_word(of_domain)) {
             const auto k0 = static_cast<std::uint32_t>(stream.seed), k1 = static_cast<std::uint32_t>(stream.seed >> 32);
             for (std::uint32_t round = 0; round < 10; ++round) {
                 key0[round] = V::set_wide(k0 + round * 0x9e3779b9u);
@@ -144,6 +147,126 @@ template <class V> struct NativeKernels {
             waiting = step;
         });
         for (std::size_t i = 0; i < waiting; ++i) ++row[slot[(current ^ step) + i]];
+    }
+
+    static F load(const Lanes& lanes) { return V::load(lanes); }
+    static F clamp(F x, F lo, F hi) { return V::min(V::max(x, lo), hi); }
+    static F uniform(U word) {
+        const U odd = V::bit_or(V::template shift_left<1>(V::template shift_right<9>(word)), V::set_word(1));
+        return V::mul(V::from_signed(odd), V::set(0x1p-24f));
+    }
+
+    static F exp2(F y) {
+        const F c = clamp(y, V::set(-125.0f), V::set(125.0f)), magic = V::set(0x1.8p23f);
+        const F shifted = V::add(c, magic), r = V::sub(c, V::sub(shifted, magic));
+        const F p = horner(r, {1.3264727e-3f, 9.671513e-3f, 5.5507336e-2f, 2.4022242e-1f, 6.931470e-1f, 1.0f});
+        return V::from_bits(V::add(V::bits(p), V::template shift_left<23>(V::bits(shifted))));
+    }
+
+    static F minus_log1p(F t) {
+        const F kept = V::max(t, V::set(-0.99999994f));
+        const U bits = V::bits(V::add(kept, V::set(1.0f)));
+        const U e = V::template shift_right_signed<23>(V::sub(bits, V::set_word(0x3f3504f3u)));
+        const F m = V::from_bits(V::sub(bits, V::template shift_left<23>(e)));
+        const F f = V::where_zero(e, kept, V::sub(m, V::set(1.0f)));
+        const F p = horner(f, {-7.634499e-2f, 1.2761578e-1f, -1.3160183e-1f, 1.4201757e-1f, -1.6623357e-1f, 2.0001227e-1f,
+                               -2.500082e-1f, 3.333333e-1f});
+        const F square = V::mul(f, f);
+        const F log_m = V::add(f, V::fma(V::mul(square, f), p, V::mul(V::set(-0.5f), square)));
+        return V::fma(V::from_signed(e), V::set(-0.69314718f), V::sub(V::set(0.0f), log_m));
+    }
+
+    using M = typename V::M;
+    static F pick(const Lanes* of, M b, M c) { return V::blend(V::blend(load(of[0]), load(of[1]), b), load(of[2]), c); }
+    static F pick(F a0, F a1, F a2, M b, M c) { return V::blend(V::blend(a0, a1, b), a2, c); }
+
+    static M in_box(const float* box, const F* c) {
+        M in = V::ge(c[0], V::set(box[6]));
+        in = V::both(in, V::ge(V::set(box[7]), c[0]));
+        in = V::both(in, V::ge(c[1], V::set(box[8])));
+        in = V::both(in, V::ge(V::set(box[9]), c[1]));
+        in = V::both(in, V::ge(c[2], V::set(box[10])));
+        in = V::both(in, V::ge(V::set(box[11]), c[2]));
+        for (int k = 0; k < 3; ++k) in = V::both(in, V::ge(V::set(box[12 + k]), c[3 + k]));
+        return in;
+    }
+
+    static F lit(const MediumPixels& p, F x, F value) {
+        if (!p.spheres.empty()) {
+            F c[3];
+            for (int k = 0; k < 3; ++k) c[k] = V::fma(load(p.rate[k]), x, load(p.base[k]));
+            for (const float* s : p.spheres) {
+                const F a = V::sub(c[0], V::set(s[4])), b = V::sub(c[1], V::set(s[5]));
+                const F h = V::max(V::sub(c[2], V::set(s[6])), V::set(0.0f));
+                const F d = V::fma(a, a, V::fma(b, b, V::mul(h, h)));
+                value = V::blend(value, V::set(0.0f), V::ge(V::set(s[3]), d));
+            }
+        }
+        if (!p.boxes.empty()) {
+            F c[6];
+            for (int k = 0; k < 6; ++k) c[k] = V::fma(load(p.rate[3 + k]), x, load(p.base[3 + k]));
+            for (const float* box : p.boxes) value = V::blend(value, V::set(0.0f), in_box(box, c));
+        }
+        return value;
+    }
+
+    struct MediumConstants {
+        explicit MediumConstants(const clratio::device::clr_medium& s) {
+            for (int c = 0; c < 3; ++c) {
+                strength[c] = V::set(s.strength[c]);
+                inverse_sigma[c] = V::set(s.inverse_sigma[c]);
+                decay[c] = V::set((s.sigma[0] - s.sigma[c]) * CLR_LOG2_E);
+            }
+        }
+        F strength[3], inverse_sigma[3], decay[3];
+    };
+
+    static void medium_sample(const MediumConstants& s, const MediumPixels& p, F u, F* m, F* t) {
+        const M b = V::ge(u, load(p.channel_from[0])), c2 = V::ge(u, load(p.channel_from[1]));
+        const M in1 = V::ge(u, pick(load(p.piece_from[0][0]), load(p.piece_from[1][0]), load(p.piece_from[2][0]), b, c2));
+        const M in2 = V::ge(u, pick(load(p.piece_from[0][1]), load(p.piece_from[1][1]), load(p.piece_from[2][1]), b, c2));
+        F slope[3], offset[3];
+        for (int i = 0; i < 3; ++i) {
+            slope[i] = pick(load(p.slope[0][i]), load(p.slope[1][i]), load(p.slope[2][i]), b, c2);
+            offset[i] = pick(load(p.offset[0][i]), load(p.offset[1][i]), load(p.offset[2][i]), b, c2);
+        }
+        const F at =
+            V::fma(pick(slope[0], slope[1], slope[2], in1, in2), u, pick(offset[0], offset[1], offset[2], in1, in2));
+        const F inverse = pick(s.inverse_sigma[0], s.inverse_sigma[1], s.inverse_sigma[2], b, c2);
+        const F above = clamp(V::mul(minus_log1p(at), inverse), V::set(0.0f), pick(p.rise, in1, in2));
+        const F phi = V::add(pick(p.low, in1, in2), above);
+        const F x = clamp(V::fma(above, pick(p.stride, in1, in2), pick(p.start, in1, in2)), V::set(0.0f), load(p.length));
+        const F e1 = V::mul(s.strength[1], exp2(V::mul(s.decay[1], phi)));
+        const F e2 = V::mul(s.strength[2], exp2(V::mul(s.decay[2], phi)));
+        const F whole = V::div(load(p.scale), V::add(V::add(s.strength[0], e1), e2));
+        const F one[3] = {V::mul(s.strength[0], whole), V::mul(e1, whole), V::mul(e2, whole)};
+        const F seen = lit(p, x, V::set(1.0f));
+        for (int c = 0; c < 3; ++c) {
+            t[c] = V::add(t[c], one[c]);
+            m[c] = V::fma(one[c], seen, m[c]);
+        }
+    }
+
+    template <class Source>
+    static void medium_sums(const MediumConstants& s, const MediumPixels& p, const Source& draw, std::uint32_t samples,
+                            MediumSums& out) {
+        F m[3], t[3];
+        for (int c = 0; c < 3; ++c) m[c] = t[c] = V::set(0.0f);
+        for (std::uint32_t quad = 0; quad < samples / 4; ++quad) {
+            const Words w = draw(std::uint64_t{quad} << 32 | p.pixel);
+            for (const U& word : w) medium_sample(s, p, uniform(word), m, t);
+        }
+        for (int c = 0; c < 3; ++c) {
+            V::store(m[c], out.m[c]);
+            V::store(t[c], out.t[c]);
+        }
+    }
+
+    static void medium(const clratio::device::clr_medium& scene, const MediumPixels* pixels, std::size_t count,
+                       clratio::Stream stream, std::uint32_t samples, MediumSums* out) {
+        const MediumConstants s(scene);
+        const Philox draw(stream, CLR_DOMAIN_SCENE);
+        for (std::size_t i = 0; i < count; ++i) medium_sums(s, pixels[i], draw, samples, out[i]);
     }
 };
 

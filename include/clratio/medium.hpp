@@ -79,7 +79,7 @@ enum class Sampling : std::uint32_t {
     uni = CLR_UNI,              ///< uniform: ray marching, with the stratified or offset pattern
     ds = CLR_DS,                ///< exp(-sigma_bar s) on the ray: truncated distance sampling
     dsa = CLR_DSA,              ///< the same on all s > 0: samples behind the medium count as 0
-    dsm = CLR_DSM,              ///< ds with one sigma_t of the three, chosen by their tau; balance heuristic
+    dsm = CLR_DSM,              ///< ds with one sigma_t of the three, each as often; balance heuristic
     wvds_mean = CLR_WVDS_MEAN,  ///< exp(-sigma_bar phi(s))
     wvds_min = CLR_WVDS_MIN,    ///< exp(-min sigma_t phi(s)): bounded weights
     wvds_mis = CLR_WVDS_MIS,    ///< exp(-sigma_t phi(s)), one sigma_t of the three, chosen by their tau; balance heuristic
@@ -121,11 +121,12 @@ public:
     bool stopped() const;  ///< by an occluder
     Rgb tau() const, mu() const;
     std::vector<double> breaks() const;    ///< where phi bends
-    std::vector<Stretch> lit() const;     ///< the parts that see the light
+    std::vector<Stretch> lit() const;      ///< the parts that see the light
     double exit_distance(double s) const;  ///< from the point at s toward the light to the end of the medium
 
     SecondMoments second_moments(Sampling sampling) const;
-    /// Where a sample with this u in [0, 1] lies; may lie behind leave() with dsa.
+    /// Where a sample with this u in [0, 1] lies; may lie behind leave() with dsa. Mixtures take channels by sigma_t, those
+    /// without light last.
     double distance(Sampling sampling, double u) const;
 
     struct State;

@@ -99,7 +99,7 @@ CLR_FN clr_real clr_decayed(clr_real z) {
     p = clr_fma(p, z, (clr_real)(1.6666225e-1f));
     p = clr_fma(p, z, (clr_real)(-0.49999982f));
     p = clr_fma(p, z, (clr_real)(1.0f));
-    return z < (clr_real)(0.5f) ? p * z : (clr_real)(1.0f) - clr_exp(-z);
+    return z < (clr_real)(0.5f) ? p * z : (clr_real)(1.0f) - clr_exp2((clr_real)(-CLR_LOG2_E) * z);
 }
 
 // -log(1 + t) for -1 < t <= 0, relative error below 3e-7 however small t is; t is kept from -1 by half an ulp.
@@ -137,18 +137,22 @@ typedef struct {
     clr_real enter, leave;
 } clr_span_of_ray;
 
-// Where a ray from 0 enters and leaves the box of lo and hi; enter > leave where it misses.
-CLR_FN clr_span_of_ray clr_slabs(const clr_real* direction, float lo0, float lo1, float lo2, float hi0, float hi1,
-                                 float hi2) {
-    const float lo[3] = {lo0, lo1, lo2}, hi[3] = {hi0, hi1, hi2};
+// 1 / direction, 1 where that is 0.
+typedef struct {
+    clr_real x[3];
+} clr_inverse;
+
+// Where a ray from 0 enters and leaves the box whose corners are the floats from `corners` on; enter > leave where it
+// misses.
+CLR_FN clr_span_of_ray clr_slabs(const clr_real* direction, clr_inverse inverse, CLR_GLOBAL const float* corners) {
     clr_span_of_ray s;
     s.enter = (clr_real)(-CLR_FAR);
     s.leave = (clr_real)(CLR_FAR);
     for (int k = 0; k < 3; ++k) {
+        const float lo = corners[k], hi = corners[3 + k];
         const clr_mask along = direction[k] == (clr_real)(0.0f);
-        const clr_real reach = (clr_real)(lo[k] <= 0.0f && hi[k] >= 0.0f ? CLR_FAR : -CLR_FAR);
-        const clr_real inverse = (clr_real)(1.0f) / (along ? (clr_real)(1.0f) : direction[k]);
-        const clr_real a = (clr_real)(lo[k]) * inverse, b = (clr_real)(hi[k]) * inverse;
+        const clr_real reach = (clr_real)(lo <= 0.0f && hi >= 0.0f ? CLR_FAR : -CLR_FAR);
+        const clr_real a = (clr_real)(lo)*inverse.x[k], b = (clr_real)(hi)*inverse.x[k];
         s.enter = clr_most(s.enter, along ? -reach : clr_least(a, b));
         s.leave = clr_least(s.leave, along ? reach : clr_most(a, b));
     }
@@ -178,14 +182,15 @@ CLR_FN clr_real clr_enter_sphere(const clr_real* direction, CLR_GLOBAL const flo
 CLR_FN clr_real clr_first_hit(clr_medium s, CLR_GLOBAL const float* occluders, const clr_real* direction) {
     const clr_real zero = (clr_real)(0.0f);
     clr_real first = (clr_real)(CLR_FAR);
+    clr_inverse inverse;
+    for (int k = 0; k < 3; ++k) inverse.x[k] = (clr_real)(1.0f) / (direction[k] == zero ? (clr_real)(1.0f) : direction[k]);
     for (clr_u32 i = 0; i < s.spheres; ++i) {
         const clr_real enter = clr_enter_sphere(direction, occluders + i * CLR_SPHERE_FLOATS);
         first = enter > zero ? clr_least(first, enter) : first;
     }
     CLR_GLOBAL const float* boxes = occluders + s.spheres * CLR_SPHERE_FLOATS;
     for (clr_u32 i = 0; i < s.boxes; ++i) {
-        CLR_GLOBAL const float* b = boxes + i * CLR_BOX_FLOATS;
-        const clr_span_of_ray span = clr_slabs(direction, b[0], b[1], b[2], b[3], b[4], b[5]);
+        const clr_span_of_ray span = clr_slabs(direction, inverse, boxes + i * CLR_BOX_FLOATS);
         const clr_real enter = span.leave >= span.enter ? span.enter : zero;
         first = enter > zero ? clr_least(first, enter) : first;
     }
@@ -269,11 +274,11 @@ CLR_FN clr_two clr_combine_axes(const float c[2][3], clr_real i, const float a[2
     return clr_two_make(second.hi, (first.lo + second.lo) + (ia.lo + jb.lo) + low);
 }
 
-// c / d within a few 2^-46.
-CLR_FN clr_two clr_two_quotient(float high, float low, clr_two d) {
-    const clr_real q = (clr_real)(high) / d.hi;
+// c / d within a few 2^-46, inverse = 1 / d.hi.
+CLR_FN clr_two clr_two_quotient(float high, float low, clr_two d, clr_real inverse) {
+    const clr_real q = (clr_real)(high)*inverse;
     const clr_real rest = clr_fma(-q, d.hi, (clr_real)(high)) + clr_fma(-q, d.lo, (clr_real)(low));
-    return clr_two_make(q, rest / d.hi);
+    return clr_two_make(q, rest * inverse);
 }
 
 CLR_FN clr_two clr_choose(clr_mask first, clr_two a, clr_two b) {
@@ -295,8 +300,9 @@ CLR_FN clr_chord clr_box_chord(clr_medium s, const clr_two* direction) {
         const clr_mask along = direction[k].hi == zero;
         const clr_real reach = (clr_real)(s.to_lo[0][k] <= 0.0f && s.to_hi[0][k] >= 0.0f ? CLR_FAR : -CLR_FAR);
         const clr_two d = clr_choose(along, clr_two_make(one, zero), direction[k]);
-        const clr_two a = clr_two_quotient(s.to_lo[0][k], s.to_lo[1][k], d);
-        const clr_two b = clr_two_quotient(s.to_hi[0][k], s.to_hi[1][k], d);
+        const clr_real inverse = one / d.hi;
+        const clr_two a = clr_two_quotient(s.to_lo[0][k], s.to_lo[1][k], d, inverse);
+        const clr_two b = clr_two_quotient(s.to_hi[0][k], s.to_hi[1][k], d, inverse);
         const clr_mask upward = d.hi > zero;
         const clr_two enter = clr_choose(along, clr_two_make(-reach, zero), clr_choose(upward, a, b));
         const clr_two leave = clr_choose(along, clr_two_make(reach, zero), clr_choose(upward, b, a));
@@ -441,16 +447,14 @@ CLR_FN clr_medium_plan clr_make_plan(clr_u32 sampling, clr_medium s, const clr_m
         for (int c = 0; c < 3; ++c) plan.scale[c] = plan.scale[c] * (clr_real)(s.inverse_sigma_mean);
     }
     if (sampling == CLR_DSM) {
-        clr_real from = zero;
-        const clr_real share = clr_inverse_or_zero(sum);
+        const clr_real third = (clr_real)(0.33333334f);
         for (int c = 0; c < 3; ++c) {
-            const clr_real part = ray->tau[c] * share;
             const clr_real z = clr_most((clr_real)(s.sigma[c]) * ray->length, (clr_real)(CLR_LEAST_RISE));
-            plan.depth[c][0] = clr_depth_line(from, part, z, never);
-            from = from + part;
-            if (c < 2) plan.channel_from[c] = from;
-            plan.low[c] = part * clr_inverse_or_zero(ray->length * (clr_decayed(z) / z));
+            plan.depth[c][0] = clr_depth_line((clr_real)((float)c) * third, third, z, never);
+            plan.low[c] = third * clr_inverse_or_zero(ray->length * (clr_decayed(z) / z));
         }
+        plan.channel_from[0] = third;
+        plan.channel_from[1] = third + third;
     }
     if (sampling == CLR_WVDS_MEAN || sampling == CLR_WVDS_MIN) {
         const float sigma = sampling == CLR_WVDS_MEAN ? s.sigma_mean : clr_least_sigma(s);
@@ -711,24 +715,25 @@ CLR_FN void clr_find_shadows(clr_medium s, CLR_GLOBAL const float* occluders, co
     }
 }
 
-// Whether the light reaches the place x on the ray.
-CLR_FN clr_mask clr_lit(clr_medium s, CLR_GLOBAL const float* occluders, const clr_shadows* shadows, clr_real x) {
-    clr_mask shaded = x < (clr_real)(0.0f);
+// 1 where the light reaches the place x on the ray, else 0. A number, not a mask: PoCL keeps masks in whole vectors.
+CLR_FN clr_real clr_lit(clr_medium s, CLR_GLOBAL const float* occluders, const clr_shadows* shadows, clr_real x) {
+    const clr_real zero = (clr_real)(0.0f);
+    clr_real lit = (clr_real)(1.0f);
     if (shadows->spheres) {
         const clr_light_place p = clr_sphere_place(shadows, x);
         for (clr_u32 i = 0; i < shadows->spheres; ++i) {
             CLR_GLOBAL const float* sphere = occluders + shadows->list[i];
             const clr_real distance = clr_sphere_distance(p.c[0] - (clr_real)(sphere[4]), p.c[1] - (clr_real)(sphere[5]),
                                                           p.c[2] - (clr_real)(sphere[6]));
-            shaded = shaded | (distance <= (clr_real)(sphere[3]));
+            lit = distance <= (clr_real)(sphere[3]) ? zero : lit;
         }
     }
     if (shadows->boxes) {
         const clr_light_place p = clr_box_place(shadows, x);
         for (clr_u32 i = 0; i < shadows->boxes; ++i)
-            shaded = shaded | clr_in_box_shadow(s.axial, occluders + shadows->list[CLR_MOST_OCCLUDERS + i], &p, &p);
+            lit = clr_in_box_shadow(s.axial, occluders + shadows->list[CLR_MOST_OCCLUDERS + i], &p, &p) ? zero : lit;
     }
-    return !shaded;
+    return lit;
 }
 
 // Sums of samples, in radiance.
@@ -774,8 +779,7 @@ CLR_FN clr_medium_sums clr_add_samples(clr_u32 generator, clr_u32 sampling, clr_
                                        CLR_GLOBAL const float* occluders, const clr_medium_ray* ray,
                                        const clr_medium_plan* plan, const clr_shadows* shadows, clr_stream stream,
                                        clr_u32 pixel, clr_u32 from, clr_u32 to, clr_medium_sums sums) {
-    const clr_real zero = (clr_real)(0.0f);
-    clr_real first = zero;
+    clr_real first = (clr_real)(0.0f);
     if (sampler.pattern == CLR_OFFSET) first = clr_uniform(clr_quad(generator, stream, pixel, 0).w0);
     for (clr_u32 quad = from / 4; quad * 4 < to; ++quad) {
         clr_words w = clr_quad(generator, stream, pixel, quad);
@@ -787,10 +791,10 @@ CLR_FN clr_medium_sums clr_add_samples(clr_u32 generator, clr_u32 sampling, clr_
         }
         for (clr_u32 i = begin; i < end; ++i) {
             const clr_medium_sample one = clr_sample(sampling, s, ray, plan, clr_sample_u(sampler, i, w.w0, first));
-            const clr_mask lit = clr_lit(s, occluders, shadows, one.x);
+            const clr_real lit = clr_lit(s, occluders, shadows, one.x);
             for (int c = 0; c < 3; ++c) {
                 sums.t[c] = sums.t[c] + one.t[c];
-                sums.m[c] = sums.m[c] + (lit ? one.t[c] : zero);
+                sums.m[c] = clr_fma(one.t[c], lit, sums.m[c]);
             }
             w.w0 = w.w1;
             w.w1 = w.w2;
