@@ -26,12 +26,12 @@ Json json_of(const Options& options, const Report& r) {
         out["state"] = {{"file", options.state}, {"ranges", r.ranges}, {"held", r.held}, {"added", r.batches - r.held}};
     if (r.intervals) {
         const auto& [bounded, exclusive, whole] = r.intervals->kinds;
-        out["interval"] = {{"level", *options.interval},
-                           {"method", options.method},
-                           {"bounded", bounded},
-                           {"exclusive", exclusive},
-                           {"whole_line", whole}};
-        if (r.intervals->coverage) out["interval"]["coverage"] = *r.intervals->coverage;
+        out["interval"] = {{"level", *options.interval}, {"method", options.method}, {"bounded", bounded},
+                           {"exclusive", exclusive},     {"whole_line", whole},      {"points", r.intervals->points}};
+        if (r.intervals->coverage) {
+            out["interval"]["coverage"] = *r.intervals->coverage;
+            out["interval"]["coverage_with_width"] = *r.intervals->coverage_with_width;
+        }
     }
     if (r.scores) {
         out["rmse"] = r.scores->estimate.rmse;
@@ -73,9 +73,12 @@ void print_text(const Options& options, const Report& r) {
     print_flags(options, r);
     if (r.intervals) {
         const auto& [bounded, exclusive, whole] = r.intervals->kinds;
-        fmt::print("{} intervals of level {}: {} bounded, {} exclusive, {} the whole line\n", options.method,
-                   *options.interval, bounded, exclusive, whole);
-        if (r.intervals->coverage) fmt::print("  {:.2f} % of the reference lies in them\n", 100 * *r.intervals->coverage);
+        fmt::print("{} intervals of level {}: {} bounded ({} of them points: all batches agree), {} exclusive, {} the whole "
+                   "line\n",
+                   options.method, *options.interval, bounded, r.intervals->points, exclusive, whole);
+        if (r.intervals->coverage)
+            fmt::print("  {:.2f} % of the reference lies in them, {:.2f} % in those that are no points\n",
+                       100 * *r.intervals->coverage, 100 * *r.intervals->coverage_with_width);
     }
     if (r.scores) {
         fmt::print("against {}\n  {:<15} {:>10} {:>12}\n", options.reference, "", "RMSE", "bias");

@@ -18,8 +18,10 @@ struct Scores {
 };
 
 struct Intervals {
-    std::array<std::uint64_t, 3> kinds{};  ///< bounded, exclusive, whole line
-    std::optional<double> coverage;        ///< share of the reference's values that lie in theirs
+    std::array<std::uint64_t, 3> kinds{};       ///< bounded, exclusive, whole line
+    std::uint64_t points = 0;                   ///< without width: the batches agree exactly
+    std::optional<double> coverage;             ///< share of the reference's values that lie in theirs
+    std::optional<double> coverage_with_width;  ///< the same among intervals that are no points
 };
 
 struct Report {

@@ -50,14 +50,24 @@ double root_mean_square(const std::vector<float>& errors) {
 /// How many intervals are of each kind, and in how many the reference lies.
 Intervals summary(const clratio::CombinedImage& out, const clratio::Image& reference) {
     Intervals sum;
-    std::uint64_t covered = 0;
+    std::uint64_t covered = 0, covered_points = 0;
     for (std::size_t i = 0; i < out.kind.size(); ++i) {
+        const float lower = out.lower.values[i], upper = out.upper.values[i];
+        const bool point = lower == upper;
         ++sum.kinds.at(out.kind[i]);
+        sum.points += point;
         if (reference.values.empty()) continue;
-        const float x = reference.values[i], lower = out.lower.values[i], upper = out.upper.values[i];
-        covered += out.kind[i] == CLR_KIND_EXCLUSIVE ? x <= lower || x >= upper : x >= lower && x <= upper;
+        const float x = reference.values[i];
+        const bool in = out.kind[i] == CLR_KIND_EXCLUSIVE ? x <= lower || x >= upper : x >= lower && x <= upper;
+        covered += in;
+        covered_points += in && point;
     }
-    if (!reference.values.empty()) sum.coverage = static_cast<double>(covered) / static_cast<double>(out.kind.size());
+    const auto share = [](std::uint64_t part, std::uint64_t all) {
+        return all == 0 ? 0 : static_cast<double>(part) / static_cast<double>(all);
+    };
+    if (reference.values.empty()) return sum;
+    sum.coverage = share(covered, out.kind.size());
+    sum.coverage_with_width = share(covered - covered_points, out.kind.size() - sum.points);
     return sum;
 }
 
