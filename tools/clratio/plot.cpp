@@ -88,8 +88,6 @@ set mxtics 2
 set grid xtics ytics linetype 1 linewidth 0.5 linecolor rgb '#ececec'
 set xzeroaxis linetype 1 linewidth 0.7 linecolor rgb '#c8c8c8'
 set key top right Left reverse samplen 1.8 spacing 1.1 width -1 noautotitle textcolor rgb '#303030'
-set xlabel 'probability density' textcolor rgb '#303030'
-set ylabel 'error' textcolor rgb '#303030'
 )";
 
 std::string style_of(const Curve& curve) {
@@ -127,8 +125,22 @@ std::vector<Curve::Point> drawn(const Curve& curve, const Panel& panel) {
 std::string data(const Curve& curve, const Panel& panel, const std::string& name) {
     std::string text = name + " << EOD\n";
     for (const auto& p : drawn(curve, panel))
-        text += p.density < least_visible * panel.most_density ? "\n" : fmt::format("{:.5g} {:.6g}\n", p.density, p.error);
+        text += !panel.doubling && p.density < least_visible * panel.most_density
+                    ? "\n"
+                    : fmt::format("{:.5g} {:.6g}\n", p.density, p.error);
     return text + "NaN NaN\nEOD\n";
+}
+
+std::string axes(const Panel& panel) {
+    std::string tics = "autofreq";
+    if (panel.doubling) {
+        tics = "(";
+        for (int power = 0; power <= panel.most_density; power += 2)
+            tics += fmt::format("{}'{}' {}", power ? ", " : "", 1 << power, power);
+        tics += ")";
+    }
+    return fmt::format("set xlabel '{}' textcolor rgb '#303030'\nset ylabel '{}' textcolor rgb '#303030'\nset xtics {}\n",
+                       panel.x_label, panel.y_label, tics);
 }
 
 std::string plot(const Panel& panel) {
@@ -140,8 +152,8 @@ std::string plot(const Panel& panel) {
         parts += fmt::format("{}{} using 1:2 with {}{}", i ? ", \\\n     " : "plot ", name, style_of(curve),
                              curve.title.empty() ? "" : " title '" + curve.title + "'");
     }
-    return fmt::format("{}set title '{}' textcolor rgb '#101010'\nset xrange [0:{}]\nset yrange [{}:{}]\n{}\n", blocks,
-                       panel.title, panel.most_density, panel.least_error, panel.most_error, parts);
+    return axes(panel) + fmt::format("{}set title '{}' textcolor rgb '#101010'\nset xrange [0:{}]\nset yrange [{}:{}]\n{}\n",
+                                     blocks, panel.title, panel.most_density, panel.least_error, panel.most_error, parts);
 }
 
 std::string script(const Drawing& drawing, const std::string& file) {

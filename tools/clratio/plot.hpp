@@ -22,6 +22,8 @@ struct Panel {
     std::string title;
     double most_density = 1, least_error = -1, most_error = 1;
     std::vector<Curve> curves;
+    std::string x_label = "probability density", y_label = "error";
+    bool doubling = false;  ///< x is the logarithm to base 2 of what the axis shows
 };
 
 /// Panels side by side. Titles are gnuplot's enhanced text, without apostrophes.

@@ -37,6 +37,7 @@ void add_picture(CLI::App& app, Run& run);
 void add_law(CLI::App& app, Run& run);
 void add_errors(CLI::App& app, Run& run);
 void add_figures(CLI::App& app, Run& run);
+void add_estimators(CLI::App& app, Run& run);
 void add_audit(CLI::App& app, Run& run);
 
 /// Keys in the order they were set, as a reader would want them.
