@@ -58,6 +58,7 @@ public:
         for (int k = 0; k < count; ++k) {
             Samples draw(static_cast<std::uint64_t>(k) + 1);
             Image m = state_shape(), t = m;
+            m.alpha[0] = static_cast<float>(k);
             m.values = floats(state_values, [&] { return draw.normal(); });
             if (k == 1) m.values[3] = std::numeric_limits<float>::quiet_NaN();
             t.values = floats(state_values, [&] { return draw.uniform(); });
@@ -142,6 +143,18 @@ TEST(StateTool, in_pieces_or_at_once_gives_the_same_bytes) {
     done(batches.combine(0, 11) + read + Words{"--state", state, "--resume"});
     EXPECT_EQ(bytes_of(state), grown) << "nothing is added twice";
     EXPECT_EQ(scratch.files(), 4u) << "locks and temporary files are gone";
+}
+
+TEST(StateTool, alpha_is_that_of_the_first_batch_in_whatever_order_they_come) {
+    const Scratch scratch;
+    const Batches batches(4);
+    const std::string state = scratch / "s.exr";
+    done(batches.combine(2, 4) + Words{"--first-batch", "2", "--state", state});
+    EXPECT_EQ(read_state(state).shape.alpha[0], 2);
+    done(batches.combine(0, 2) + Words{"--state", state, "--resume"});
+    EXPECT_EQ(read_state(state).shape.alpha[0], 0);
+    done(batches.combine(0, 4) + Words{"--state", state, "--resume", "--tau", "1", "-o", scratch / "o.exr"});
+    EXPECT_EQ(read_image(scratch / "o.exr").alpha[0], 0);
 }
 
 TEST(StateTool, the_verdict_sees_a_batch_counted_twice) {

@@ -61,8 +61,8 @@ class RandomDelays {
 public:
     explicit RandomDelays(std::uint64_t seed) : draw_(seed) {}
     void sleep() { std::this_thread::sleep_for(draw_.uniform() * whole_); }
-    void was_too_late() { whole_ *= .9; }
-    void was_too_early() { whole_ *= 1.2; }
+    void was_too_late() { whole_ *= .8; }
+    void was_too_early() { whole_ *= 1.1; }
 
 private:
     Samples draw_;
