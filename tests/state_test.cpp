@@ -380,6 +380,20 @@ TEST(State, only_what_nobody_writes_is_removed) {
     EXPECT_FALSE(std::filesystem::exists(scratch / ".a.exr.77-0.tmp"));
 }
 
+TEST(State, writers_of_one_file_do_not_disturb_each_other) {
+    const Scratch scratch;
+    const Engine engine;
+    const std::string path = scratch / "a.exr";
+    const auto states = prefixes(engine, 2);
+    const auto write_often = [&](const StateFile& s) {
+        for (int k = 0; k < 40; ++k) EXPECT_NO_THROW(write_state(path, s));
+    };
+    { const std::jthread one(write_often, std::cref(states[0])), other(write_often, std::cref(states[1])); }
+    const StateFile last = read_state(path);
+    EXPECT_TRUE(same(last, states[0]) || same(last, states[1]));
+    EXPECT_EQ(scratch.files(), 1u);
+}
+
 // ---- merging
 
 TEST(State, merging_is_that_of_the_moments_in_any_order) {
