@@ -6,12 +6,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <csignal>
 #include <cstdlib>
+#include <functional>
 #include <optional>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -28,8 +27,8 @@ struct Surroundings {
     std::vector<std::pair<std::string, std::string>> environment{};
     std::optional<std::size_t> file_size_limit{};
     std::string out{};  ///< where stdout goes instead of Said::out
-    int signal = 0;     ///< sent once, `after` the start
-    std::chrono::microseconds after{};
+    int signal = 0;     ///< sent when `wait` comes back
+    std::function<void()> wait{};
 };
 
 inline Said run(const std::string& program, const std::vector<std::string>& arguments, const Surroundings& around = {}) {
@@ -51,7 +50,7 @@ inline Said run(const std::string& program, const std::vector<std::string>& argu
         _exit(127);
     }
     if (around.signal != 0) {
-        std::this_thread::sleep_for(around.after);
+        around.wait();
         kill(child, around.signal);
     }
     int status = 0;

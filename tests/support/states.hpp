@@ -6,7 +6,9 @@
 #include <ImfStringAttribute.h>
 #include <ImfStringVectorAttribute.h>
 
+#include <chrono>
 #include <cmath>
+#include <thread>
 
 #include "clratio/moments.hpp"
 #include "clratio/state.hpp"
@@ -53,6 +55,19 @@ inline bool same(const StateFile& a, const StateFile& b) {
            a.shape.display_window == b.shape.display_window && a.shape.alpha == b.shape.alpha && a.settings == b.settings &&
            a.ranges == b.ranges;
 }
+
+/// Moments drawn evenly from the time that some work takes, which is found out on the way: the same on a busy machine.
+class RandomDelays {
+public:
+    explicit RandomDelays(std::uint64_t seed) : draw_(seed) {}
+    void sleep() { std::this_thread::sleep_for(draw_.uniform() * whole_); }
+    void was_too_late() { whole_ *= .8; }
+    void was_too_early() { whole_ *= 1.1; }
+
+private:
+    Samples draw_;
+    std::chrono::duration<double> whole_{.1};
+};
 
 /// Copies the file with another header; pixels of channels that it no longer names are left out.
 template <class Change> void rewrite(const std::string& from, const std::string& to, Change change) {

@@ -68,6 +68,7 @@ void StateKeeper::fit(const Pair& pair) {
 }
 
 void StateKeeper::added(const Pair& pair) {
+    if (!state_.ranges.empty() && pair.index < state_.ranges.ranges().front().begin) state_.shape = without_values(pair.m);
     state_.ranges.add({pair.index, pair.index + 1});
     changed_ = true;
 }

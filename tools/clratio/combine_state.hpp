@@ -18,7 +18,7 @@ public:
 
     /// The sums to go on with, once: they are given away. Nothing where a state is begun.
     std::optional<clratio::Snapshot> take_sums();
-    /// Of the batches held or added, values left out: channels are empty before the first.
+    /// Of the first batch by index, values left out: channels are empty before there is one.
     const clratio::Image& shape() const { return state_.shape; }
     const clratio::BatchRanges& ranges() const { return state_.ranges; }
 
