@@ -45,8 +45,7 @@ kernel void clr_medium_exact(global float* out, clr_layout layout, clr_medium s,
         const clr_pixels p = clr_pixels_of(s, first_row + row, (uint)(v - (ulong)row * clr_vectors_a_row(s)));
         clr_medium_ray ray = clr_aim(s, occluders, (clr_uint)(p.column) + clr_lanes(), p.row);
         if (shaded)
-            for (int c = 0; c < 3; ++c)
-                ray.tau[c] = ray.tau[c] * clr_load(shares + (ulong)c * s.plane + p.pixel);
+            for (int c = 0; c < 3; ++c) ray.tau[c] = ray.tau[c] * clr_load(shares + (ulong)c * s.plane + p.pixel);
         clr_store_channels(ray.tau, s, out, layout, (ulong)row * s.width + p.column, p.lanes);
     }
 }
@@ -73,7 +72,8 @@ kernel void clr_medium_render(global float* m, clr_layout m_layout, global float
         for (uint k = 0; k < steps; ++k) {
             clr_step step = clr_step_of(sampler, levels, k);
             if (!some_hit) step.from = step.to;
-            sums = clr_do_step(step, CLR_GENERATOR, CLR_SAMPLING, s, occluders, &ray, &plan, &shadows, stream, p.pixel, sums);
+            sums =
+                clr_do_step(step, CLR_GENERATOR, CLR_SAMPLING, s, occluders, &ray, &plan, &shadows, stream, p.pixel, sums);
 #if CLR_INDEPENDENT_T
             others =
                 clr_do_step(step, CLR_GENERATOR, CLR_SAMPLING, s, occluders, &ray, &plan, &shadows, other, p.pixel, others);
