@@ -258,19 +258,23 @@ Json json_of(const Result& result) {
 Panel panel_of(const Result& result, const Options& options) {
     Panel panel{
         "Model " + result.model.name, std::log2(static_cast<double>(options.most)), 0, 0, {}, "N", "RMSE · √N / E[m]", true};
-    const std::vector<std::string> shown{
-        "mean", "ratio", "beale", "jackknife, 8 groups", "hartley-ross", "mickey, 8 groups", "regression", "mean-of-ratios"};
-    for (std::size_t i = 0; i < shown.size(); ++i)
+    const std::vector<std::pair<std::string, std::string>> shown{
+        {"mean", "#7f7f7f"},         {"ratio", "#d1495b"},
+        {"beale", "#e0952c"},        {"jackknife, 8 groups", "#66a182"},
+        {"hartley-ross", "#2e4057"}, {"mickey, 8 groups", "#0088a0"},
+        {"regression", "#8e5ea2"},   {"mean-of-ratios", "#202020"}};
+    for (const auto& [name, colour] : shown)
         for (const Row& row : result.rows) {
-            if (row.name != shown[i]) continue;
-            Curve curve{row.name, i < 2 ? Curve::Style::line : Curve::Style::thin, scale_colour(i, shown.size()), {}};
+            if (row.name != name) continue;
+            const bool biased = row.estimator == Estimator::mean_of_ratios;
+            Curve curve{name, biased ? Curve::Style::dashed : Curve::Style::line, colour, {}};
             for (const Cell& c : row.cells) {
                 curve.points.push_back({std::log2(static_cast<double>(c.batches)), c.rmse.mean});
-                if (row.estimator != Estimator::mean_of_ratios) panel.most_error = std::max(panel.most_error, c.rmse.mean);
+                if (!biased) panel.most_error = std::max(panel.most_error, c.rmse.mean);
             }
             panel.curves.push_back(curve);
         }
-    panel.most_error *= 1.4;  // room for the key
+    panel.most_error *= 1.6;  // room for the key
     return panel;
 }
 

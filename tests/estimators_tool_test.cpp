@@ -1,0 +1,106 @@
+// clratio estimators against theory.md's table of 20 million samples a cell, printed to two digits.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "support/run.hpp"
+
+using namespace clratio::test;
+
+namespace {
+
+nlohmann::json simulate(std::vector<std::string> more) {
+    std::vector<std::string> arguments{"estimators", "--json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Said said = run(CLRATIO_TOOL, arguments);
+    EXPECT_EQ(said.code, 0) << said.err;
+    return nlohmann::json::parse(said.out);
+}
+
+nlohmann::json cell(const nlohmann::json& result, const std::string& estimator, int n) {
+    for (const auto& c : result.at("estimators").at(estimator))
+        if (c.at("n") == n) return c;
+    throw std::runtime_error("no cell " + estimator + " at " + std::to_string(n));
+}
+
+struct Known {
+    std::string estimator;
+    int n;
+    double bias, rmse;
+};
+
+const std::vector<Known> model_a{{"mean", 4, 0, 1.63},
+                                 {"ratio", 1, -.16, .85},
+                                 {"ratio", 2, -.20, .93},
+                                 {"ratio", 4, -.23, .98},
+                                 {"ratio", 16, -.26, 1.04},
+                                 {"beale", 2, -.14, 1.00},
+                                 {"beale", 8, -.11, 1.07},
+                                 {"tin", 2, -.13, 1.03},
+                                 {"jackknife, 2 groups", 4, -.06, 1.13},
+                                 {"jackknife, 8 groups", 8, -.03, 1.12},
+                                 {"hartley-ross", 2, 0, 1.39},
+                                 {"hartley-ross", 16, 0, 1.15},
+                                 {"mickey, 8 groups", 8, 0, 1.16},
+                                 {"mickey, 8 groups", 16, 0, 1.12},
+                                 {"regression", 8, -.23, 1.12},
+                                 {"crossfit-regression, 8", 16, 0, 1.23},
+                                 {"mean-of-ratios", 16, -2.6, 1.06}};
+
+/// How far a cell is from the table, in units of what rounding (half of the last digit printed, and of the table's own
+/// noise) and 5 standard errors allow.
+double excess(const nlohmann::json& result, const Known& k) {
+    const auto c = cell(result, k.estimator, k.n);
+    const double digit = std::fabs(k.bias) >= 1 ? .05 : .005;
+    const auto one = [&](const char* name, double want, double rounding) {
+        const auto& m = c.at(name);
+        const double error = m.at("standard_error");
+        return std::fabs(m.at("mean").get<double>() - want) / (2 * rounding + 5 * error);
+    };
+    return std::max(one("bias_times_n", k.bias, digit), one("rmse_times_root_n", k.rmse, .005));
+}
+
+}  // namespace
+
+TEST(EstimatorsTool, reproduces_the_table_of_model_a) {
+    const auto a = simulate({"--models", "A", "--samples", "2000000", "--most", "16"}).at(0);
+    for (const Known& k : model_a) EXPECT_LE(excess(a, k), 1) << k.estimator << " at " << k.n;
+    for (Known k : model_a) {
+        if (k.estimator == "ratio") continue;
+        k.estimator = "ratio";
+        EXPECT_GT(excess(a, k), 1) << "planted fault: the ratio's numbers in another's place, at " << k.n;
+    }
+    const auto& at_4 = a.at("coverage").at(0);
+    EXPECT_EQ(at_4.at("n"), 4);
+    EXPECT_NEAR(at_4.at("delta").at("mean"), .79, .01);
+    EXPECT_NEAR(at_4.at("fieller").at("mean"), .94, .01);
+    EXPECT_NEAR(at_4.at("mean").at("mean"), .84, .01);
+    EXPECT_NEAR(at_4.at("unbounded"), .52, .01);
+}
+
+TEST(EstimatorsTool, unbiased_estimators_stay_so_with_unequal_weights) {
+    const auto all = simulate({"--models", "A", "B", "--samples", "500000", "--most", "16", "--unequal"});
+    for (const auto& model : all)
+        for (const char* name : {"mean", "mickey, 8 groups", "crossfit-regression, 8"}) {
+            const auto bias = cell(model, name, 16).at("bias_times_n");
+            EXPECT_NEAR(bias.at("mean"), 0, 5 * bias.at("standard_error").get<double>()) << name;
+        }
+    const auto bias = cell(all.at(0), "ratio", 16).at("bias_times_n");
+    EXPECT_LT(bias.at("mean").get<double>() + 5 * bias.at("standard_error").get<double>(), 0)
+        << "planted fault: a biased one passes";
+}
+
+TEST(EstimatorsTool, SlowTails_of_model_c) {
+    const auto c = simulate({"--models", "C", "--samples", "10000000", "--most", "64"}).at(0);
+    for (const Known& k : std::vector<Known>{{"ratio", 2, .23, .87}, {"ratio", 8, .44, 1.01}}) {
+        const auto got = cell(c, k.estimator, k.n);
+        EXPECT_NEAR(got.at("rmse_times_root_n").at("mean"), k.rmse, .02) << k.n;
+    }
+}
+
+TEST(EstimatorsTool, misuse_is_refused) {
+    const Said said = run(CLRATIO_TOOL, {"estimators", "--models", "Z"});
+    EXPECT_EQ(said.code, 2);
+    EXPECT_NE(said.err.find("--models"), std::string::npos) << said.err;
+}
