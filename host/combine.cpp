@@ -108,16 +108,17 @@ private:
     Buffer rows_;
 };
 
-std::string program_options(const Reading& reading) {
-    if (wants_more(reading.out)) return "";
-    return "-DCLR_ESTIMATOR=" + std::to_string(static_cast<std::uint32_t>(reading.options.estimator)) + "u";
+std::string program_options(const Moments::State& s, const Reading& reading) {
+    const std::string groups = s.groups.size() > 1 ? "-DCLR_MANY_GROUPS" : "";
+    if (wants_more(reading.out)) return groups;
+    return groups + " -DCLR_ESTIMATOR=" + std::to_string(static_cast<std::uint32_t>(reading.options.estimator)) + "u";
 }
 
 Event read_moments(const Moments& moments, Reading reading, std::span<const cl_event> waits) {
     auto& s = moments.state();
     if (wants_interval(reading.out) && s.options.nonfinite == NonFinite::skip)
         reading.quantiles = quantile_table(s, reading.options);
-    Launch launch(s.engine, "combine", "clr_combine_moments", program_options(reading), Lanes::wide);
+    Launch launch(s.engine, "combine", "clr_combine_moments", program_options(s, reading), Lanes::wide);
     s.give_planes(launch).arg(s.all_groups());
     s.last = reading.give(launch, s, s.batches()).after(waits).after(std::array{s.last.get()}).run_ranges(s.values);
     return s.last;

@@ -51,7 +51,9 @@ inline device::clr_estimate read_twin(std::span<const TwinValue> groups, float t
     const clr_quotient q = clr_divide_means(all.moments.m, all.moments.t, tau, ask.zero_policy);
     clr_folds folds = clr_folds_begin();
     if (clr_uses_groups(ask.estimator))
-        for (const auto& g : groups) folds = clr_fold(folds, all, q, g.record, tau, ask.estimator);
+        for (const auto& g : groups)
+            folds = clr_fold(folds, all.moments, q, g.record.moments, clr_part_of(g.record.weight, all.weight), tau,
+                             ask.estimator);
     const clr_evidence n = clr_evidence_of(all.batches, all.weight, all.weight2, ask.reliability);
     return clr_read_out(all, q, n, folds, offered, tau, quantile, ask);
 }

@@ -171,34 +171,50 @@ CLR_FN clr_two clr_without(clr_two all, clr_two group, clr_real apart) {
     return clr_two_subtract(clr_two_subtract(all, group), clr_two_make(apart, (clr_real)(0.0f)));
 }
 
-CLR_FN clr_folds clr_fold(clr_folds f, clr_record all, clr_quotient q, clr_record group, clr_real tau, clr_u32 estimator) {
+// A group's part of the weight.
+typedef struct {
+    clr_real p, a;  // of all, and over that of the other groups
+    clr_real all;   // the weight of all
+    clr_mask none;  // it has none
+} clr_part;
+
+CLR_FN clr_part clr_part_of(clr_two group, clr_two all) {
     const clr_real zero = (clr_real)(0.0f), one = (clr_real)(1.0f);
-    const clr_two rest = clr_two_subtract(all.weight, group.weight);
-    const clr_mask none = !(group.weight.hi > zero), alone = !(rest.hi > zero);
-    const clr_real p = none ? zero : group.weight.hi / (none ? one : all.weight.hi);
-    const clr_real a = alone ? zero : group.weight.hi / (alone ? one : rest.hi);
-    const clr_two dm = clr_two_subtract(group.moments.m, all.moments.m);
-    const clr_two dt = clr_two_subtract(group.moments.t, all.moments.t);
-    const clr_real beyond = clr_control_error(group.moments.t, tau);
-    f.groups += none ? (clr_uint)(0u) : (clr_uint)(1u);
+    const clr_two rest = clr_two_subtract(all, group);
+    const clr_mask alone = !(rest.hi > zero);
+    clr_part w;
+    w.none = !(group.hi > zero);
+    w.p = w.none ? zero : group.hi / (w.none ? one : all.hi);
+    w.a = alone ? zero : group.hi / (alone ? one : rest.hi);
+    w.all = all.hi;
+    return w;
+}
+
+CLR_FN clr_folds clr_fold(clr_folds f, clr_moments all, clr_quotient q, clr_moments group, clr_part w, clr_real tau,
+                          clr_u32 estimator) {
+    const clr_real zero = (clr_real)(0.0f), one = (clr_real)(1.0f);
+    const clr_two dm = clr_two_subtract(group.m, all.m);
+    const clr_two dt = clr_two_subtract(group.t, all.t);
+    const clr_real beyond = clr_control_error(group.t, tau);
+    f.groups += w.none ? (clr_uint)(0u) : (clr_uint)(1u);
     if (estimator == CLR_ESTIMATOR_CROSSFIT_REGRESSION) {
-        const clr_real apart = a * all.weight.hi * dt.hi;
-        const clr_two tt = clr_without(all.moments.tt, group.moments.tt, apart * dt.hi);
-        const clr_two mt = clr_without(all.moments.mt, group.moments.mt, apart * dm.hi);
-        f.cross = clr_fma(p * clr_slope_of_regression(mt, tt), beyond, f.cross);
+        const clr_real apart = w.a * w.all * dt.hi;
+        const clr_two tt = clr_without(all.tt, group.tt, apart * dt.hi);
+        const clr_two mt = clr_without(all.mt, group.mt, apart * dm.hi);
+        f.cross = clr_fma(w.p * clr_slope_of_regression(mt, tt), beyond, f.cross);
         return f;
     }
     const clr_two u = clr_two_subtract(dm, clr_two_multiply(q.quotient, dt));
-    const clr_real without = (q.denominator + all.moments.t.lo) - a * dt.hi;
-    const clr_mask broken = !none && without == zero;
+    const clr_real without = (q.denominator + all.t.lo) - w.a * dt.hi;
+    const clr_mask broken = !w.none && without == zero;
     const clr_real e = -(u.hi / (without == zero ? one : without));
-    const clr_real kept = broken || none ? zero : e;
+    const clr_real kept = broken || w.none ? zero : e;
     f.broken = f.broken || broken;
-    f.shift = clr_fma(p, kept, f.shift);
-    f.a += a;
-    f.ae = clr_fma(a, kept, f.ae);
-    f.aee = clr_fma(a * kept, kept, f.aee);
-    f.mickey = clr_fma(p * (a * kept), beyond, f.mickey);
+    f.shift = clr_fma(w.p, kept, f.shift);
+    f.a += w.a;
+    f.ae = clr_fma(w.a, kept, f.ae);
+    f.aee = clr_fma(w.a * kept, kept, f.aee);
+    f.mickey = clr_fma(w.p * (w.a * kept), beyond, f.mickey);
     return f;
 }
 

@@ -145,7 +145,8 @@ static inline void clr_store_ratios(clr_ratios r, clr_planes p, ulong stride, ul
     clr_store_two(r.zero_share, p.zero_share, i, stride);
 }
 
-static inline clr_record clr_load_record(clr_planes p, clr_state s, ulong i) {
+// Inlined, or the whole record goes through memory: measured, a tenth more time for estimators over groups.
+static inline __attribute__((always_inline)) clr_record clr_load_record(clr_planes p, clr_state s, ulong i) {
     clr_record r;
     r.moments = clr_load_moments(p, s, i);
     r.weight = clr_both(s.group.weight_hi, s.group.weight_lo);
