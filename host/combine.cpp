@@ -69,7 +69,7 @@ public:
             return View{wanted ? place(values) : nullptr, 0, count};
         };
         out_.estimate = view(result_.estimate, true);
-        out_.flags = place(result_.flag_image);
+        if (options.flag_image) out_.flags = place(result_.flag_image);
         out_.standard_error = view(result_.standard_error, options.standard_error);
         out_.bias = view(result_.bias, options.bias);
         out_.lower = view(result_.lower, options.interval);
@@ -211,6 +211,7 @@ Launch& Reading::give(Launch& launch, const Moments::State& state, std::uint64_t
                     write(out.lower.mem, CLR_WRITE_LOWER) | write(out.upper.mem, CLR_WRITE_UPPER) |
                     write(out.kind, CLR_WRITE_KIND) | write(out.gain.mem, CLR_WRITE_GAIN) |
                     write(out.needed.mem, CLR_WRITE_NEEDED);
+    r.ask.counted = options.counted;
     r.ask.target = options.target;
     r.ask.relative_target = options.relative_target;
     r.ask.reliability = state.options.weights == Weights::reliability ? 1 : 0;

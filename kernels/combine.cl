@@ -4,8 +4,8 @@
 #include "clratio/device/planes.h"
 
 // With groups, a block of vectors is taken through one group after the other: each plane of each group is then read in runs.
-// One vector at a time it would be 20 streams a group, which is more than prefetchers follow: measured with 8 groups, 3
-// times as slow.
+// One vector at a time it would be 20 streams a group, more than prefetchers follow: measured with 8 groups, half again as
+// slow.
 #if defined(CLR_MANY_GROUPS) && !CLR_GROUPED
 #define CLR_READ_BLOCK 16
 #else
@@ -25,7 +25,8 @@ kernel void clr_combine(global const float* m, clr_layout m_layout, global const
                            clr_load_view(tau, tau_layout, first, range.count), zero_policy);
         if (estimate) clr_store_view(r.value, estimate, estimate_layout, first, range.count);
         if (flags) clr_store_view(clr_from_bits(r.flags), flags, packed, first, range.count);
-        clr_count_flags(&tally, first + CLR_WIDTH <= range.count ? r.flags : r.flags & clr_lanes_below(first, range.count));
+        clr_count_flags(&tally, first + CLR_WIDTH <= range.count ? r.flags : r.flags & clr_lanes_below(first, range.count),
+                        0xffffffffu);
     }
     clr_store_flag_tally(&tally, flag_rows);
 }
@@ -35,7 +36,7 @@ static inline clr_state clr_state_of(clr_groups groups, uint g) {
     return s;
 }
 
-static inline __attribute__((always_inline)) clr_record clr_load_group(clr_planes base, clr_groups groups, uint g, ulong i) {
+static inline clr_record clr_load_group(clr_planes base, clr_groups groups, uint g, ulong i) {
     const clr_state s = clr_state_of(groups, g);
     return clr_load_record(clr_planes_at(base, s.base), s, i);
 }

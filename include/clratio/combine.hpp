@@ -21,6 +21,7 @@ struct CombineOptions {
     Estimator estimator = Estimator::ratio;
     Zero zero = Zero::mc_mean;
     // What a blocking call computes besides the estimate; an event form writes the views it is given.
+    bool flag_image = true;
     bool standard_error = false;
     bool bias = false;      ///< of the ratio, estimated to first order
     bool interval = false;  ///< lower, upper and kind
@@ -28,14 +29,15 @@ struct CombineOptions {
     bool needed = false;    ///< batches still to come until the standard error meets the target
     double level = 0.95;    ///< of the interval, in (0, 1)
     IntervalMethod method = IntervalMethod::fieller;
-    float target = 0, relative_target = 0;  ///< the larger of target and relative_target |estimate|
+    std::uint32_t counted = ~std::uint32_t{0};  ///< flags that make a value count in FlagCounts::any
+    float target = 0, relative_target = 0;      ///< the larger of target and relative_target |estimate|
 };
 
 /// How many values carry each flag; the CLR_FLAG_* bits of device/ratio.h name them.
 struct FlagCounts {
     std::uint64_t zero_denominator = 0, zero_tau = 0, skipped = 0, no_data = 0, no_error_bar = 0, nonfinite = 0,
                   fell_back = 0, no_spread = 0;
-    std::uint64_t any = 0;  ///< values with at least one of them
+    std::uint64_t any = 0;  ///< values with at least one of those in CombineOptions::counted
     std::uint64_t total() const { return any; }
 };
 

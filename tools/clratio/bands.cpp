@@ -17,7 +17,7 @@ template <class T> void append(std::vector<T>& to, const std::vector<T>& more) {
     to.insert(to.end(), more.begin(), more.end());
 }
 
-void append(Combined& to, const Combined& more, bool flag_image) {
+void append(Combined& to, const Combined& more) {
     append(to.estimate, more.estimate);
     append(to.standard_error, more.standard_error);
     append(to.bias, more.bias);
@@ -26,7 +26,7 @@ void append(Combined& to, const Combined& more, bool flag_image) {
     append(to.kind, more.kind);
     append(to.gain, more.gain);
     append(to.needed, more.needed);
-    if (flag_image) append(to.flag_image, more.flag_image);
+    append(to.flag_image, more.flag_image);
     to.flags.zero_denominator += more.flags.zero_denominator;
     to.flags.zero_tau += more.flags.zero_tau;
     to.flags.skipped += more.flags.skipped;
@@ -38,12 +38,8 @@ void append(Combined& to, const Combined& more, bool flag_image) {
     to.flags.any += more.flags.any;
 }
 
-std::uint64_t count_flagged(const std::vector<std::uint32_t>& flags, std::uint32_t counted) {
-    return static_cast<std::uint64_t>(std::count_if(flags.begin(), flags.end(), [&](auto f) { return (f & counted) != 0; }));
-}
-
 CombineOptions plain_mean(const CombineOptions& options) {
-    return {.estimator = clratio::Estimator::mean, .zero = options.zero};
+    return {.estimator = clratio::Estimator::mean, .zero = options.zero, .flag_image = false};
 }
 
 }  // namespace
@@ -91,9 +87,8 @@ template <class Read> ReadOut Bands::read(Read read_band, const Tau& tau, const 
     for (std::uint64_t band = 0; band < bands(); ++band) {
         const Tau part = slice(tau, begin(band), size(band));
         const auto [moments, read] = read_band(band, part);
-        append(out.chosen, read, wanted.flag_image);
-        out.flagged += count_flagged(read.flag_image, wanted.counted);
-        if (wanted.mean) append(out.mean, clratio::combine(moments, part, plain_mean(wanted.options)), false);
+        append(out.chosen, read);
+        if (wanted.mean) append(out.mean, clratio::combine(moments, part, plain_mean(wanted.options)));
         out.negatives += moments.negatives();
     }
     return out;

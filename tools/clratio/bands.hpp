@@ -12,14 +12,12 @@ namespace tool {
 
 struct Wanted {
     clratio::CombineOptions options;
-    bool mean = false;                          ///< the plain mean too
-    bool flag_image = false;                    ///< not only its counts
-    std::uint32_t counted = ~std::uint32_t{0};  ///< flags that make a value count as flagged
+    bool mean = false;  ///< the plain mean too
 };
 
 struct ReadOut {
     clratio::Combined chosen, mean;
-    std::uint64_t flagged = 0, negatives = 0;
+    std::uint64_t negatives = 0;
 };
 
 class Bands {

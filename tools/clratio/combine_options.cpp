@@ -192,8 +192,10 @@ clratio::CombineOptions Options::combine() const {
 
 Wanted Options::wanted() const {
     // A missing error bar is no defect of a run that asked for none, and batches that agree are none at all.
-    const std::uint32_t counted = ~(CLR_FLAG_NO_SPREAD | (standard_error.empty() ? CLR_FLAG_NO_ERROR_BAR : 0u));
-    return {combine(), !reference.empty(), !flags.empty(), counted};
+    Wanted wanted{combine(), !reference.empty()};
+    wanted.options.flag_image = !flags.empty();
+    wanted.options.counted = ~(CLR_FLAG_NO_SPREAD | (standard_error.empty() ? CLR_FLAG_NO_ERROR_BAR : 0u));
+    return wanted;
 }
 
 clratio::MomentsOptions Options::moments() const {

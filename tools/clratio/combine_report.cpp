@@ -45,7 +45,7 @@ Json json_of(const Options& options, const Report& r) {
 namespace {
 
 void print_flags(const Options& options, const Report& r) {
-    fmt::print("{} of {} values flagged\n", r.flagged,
+    fmt::print("{} of {} values flagged\n", r.flags.any,
                static_cast<std::uint64_t>(r.shape.width()) * static_cast<std::uint64_t>(r.shape.height()) *
                    r.shape.channels.size());
     const auto line = [](std::uint64_t count, const char* what) {

@@ -31,7 +31,6 @@ struct Report {
     std::uint64_t held = 0;  ///< of the batches, by the state that the run began with
     std::string ranges, nonfinite;
     clratio::FlagCounts flags;
-    std::uint64_t flagged = 0;  ///< values with a flag that matters to this run
     Seconds seconds;
     std::optional<Scores> scores;
     std::optional<Intervals> intervals;

@@ -147,7 +147,6 @@ void CombineRun::write(ReadOut&& read_out) {
     report_.batches = batches();
     report_.ranges = keeper_.ranges().text();
     report_.flags = out.flags;
-    report_.flagged = read_out.flagged;
     report_.negatives = read_out.negatives;
     if (options_.interval) report_.intervals = summary(out, reference_);
     rms_error_ = root_mean_square(out.standard_error.values);
@@ -181,7 +180,7 @@ int CombineRun::report(double decode) {
         print(json_of(options_, report_));
     else
         print_text(options_, report_);
-    return options_.fail_on_flag && report_.flagged > 0 ? flagged : ok;
+    return options_.fail_on_flag && report_.flags.any > 0 ? flagged : ok;
 }
 
 }  // namespace tool::combining

@@ -42,6 +42,7 @@ CLR_NAMESPACE_BEGIN
 typedef struct {
     clr_u32 estimator, zero_policy, interval, outputs;
     float target, relative_target;  // of the standard error: the larger of target and relative_target |estimate|
+    clr_u32 counted;                // flags that make a value count as flagged
     clr_u32 reliability;            // 1: weights are not sample counts; the records hold weight2
 } clr_question;
 
