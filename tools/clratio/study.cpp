@@ -18,7 +18,7 @@ struct Options {
     std::string size, folder, shard;
     std::uint64_t seeds = 0;
     int lanes = 0;
-    bool quick = false, gray = false, json = false;
+    bool quick = false, gray = false, no_report = false, json = false;
 };
 
 struct Shard {
@@ -96,7 +96,10 @@ public:
         for (std::size_t i = shard_.index - 1; i < pieces.size(); i += shard_.count) {
             Part part;
             ++work_.pieces;
-            folder_.read(pieces[i], part) ? ++work_.found : (missing.push_back(pieces[i]), work_.found);
+            if (folder_.read(pieces[i], part))
+                ++work_.found;
+            else
+                missing.push_back(pieces[i]);
         }
         for (const auto& piece : missing) {
             show(piece, missing.size());
@@ -177,25 +180,20 @@ private:
     std::size_t at_ = 0;
 };
 
-void print_work(const Options& o, const Work& w, const std::vector<Claim>& claims) {
+void print_work(const Options& o, const Work& w, const std::vector<Claim>& claims, const std::vector<std::string>& files) {
     if (o.json) {
-        Json out{{"parts", w.pieces},    {"found", w.found},     {"taken", w.taken},       {"computed", w.computed},
-                 {"samples", w.samples}, {"seconds", w.seconds}, {"claims", Json::array()}};
+        Json out{{"parts", w.pieces},    {"found", w.found},     {"taken", w.taken}, {"computed", w.computed},
+                 {"samples", w.samples}, {"seconds", w.seconds}, {"files", files},   {"claims", Json::array()}};
         for (const auto& claim : claims) out["claims"].push_back(json_of(claim));
-        if (o.shard.empty())
-            for (const char* name : {"errors.csv", "densities.csv", "report.html"})
-                out["files"].push_back((fs::path(o.folder) / name).string());
         print(out);
         return;
     }
-    fmt::print("{} parts: {} found, {} taken from elsewhere, {} computed", w.pieces, w.found - std::min(w.found, w.taken),
-               w.taken, w.computed);
+    fmt::print("{} parts: {} found, {} of them taken from elsewhere, {} computed", w.pieces, w.found, w.taken, w.computed);
     if (w.computed > 0)
         fmt::print(": {:.3g} samples in {:.1f} s, {:.0f} M/s", w.samples, w.seconds, w.samples / w.seconds / 1e6);
     fmt::print("\n");
     for (const auto& claim : claims) fmt::print("\n{}", text_of(claim));
-    if (o.shard.empty())
-        fmt::print("\n{0}/report.html: open it in a browser. The numbers: {0}/errors.csv, {0}/densities.csv\n", o.folder);
+    if (!files.empty()) fmt::print("\n{}\n", fmt::join(files, "\n"));
 }
 
 int study_command(const Options& options) {
@@ -208,19 +206,21 @@ int study_command(const Options& options) {
     Runner runner(options, plan, engine);
     runner.compute_missing();
     std::vector<Claim> claims;
+    std::vector<std::string> files;
     if (runner.shard().count == 1) {
         const Results results = runner.results();
+        const auto path_of = [&](const char* name) {
+            return files.emplace_back((fs::path(options.folder) / name).string());
+        };
         claims = claims_of(results);
-        const fs::path folder = options.folder;
-        write_errors_csv(results, (folder / "errors.csv").string());
-        write_densities_csv(results, (folder / "densities.csv").string());
+        write_errors_csv(results, path_of("errors.csv"));
+        write_densities_csv(results, path_of("densities.csv"));
         const auto& w = runner.work();
-        write_report(results, claims, engine,
-                     {options.quick, w.samples, w.seconds,
-                      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()},
-                     (folder / "report.html").string());
+        const double whole = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        if (!options.no_report)
+            write_report(results, claims, engine, {options.quick, w.samples, w.seconds, whole}, path_of("report.html"));
     }
-    print_work(options, runner.work(), claims);
+    print_work(options, runner.work(), claims, files);
     return ok;
 }
 
@@ -266,6 +266,7 @@ void add_study(CLI::App& app, Run& run) {
         ->type_name("I/N");
     command->add_option("--merge", o->merge, "Take finished parts from these folders first")->type_name("DIR...");
     command->add_option("--lanes", o->lanes, "Lanes of the device's vectors: changes no result")->type_name("1|2|4|8|16");
+    command->add_flag("--no-report", o->no_report, "CSV files and verdicts only");
     command->add_flag("--json", o->json, "Print one JSON object");
     command->footer(footer);
     command->callback([=, &run] { run = [o] { return study_command(*o); }; });

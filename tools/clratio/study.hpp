@@ -66,7 +66,7 @@ constexpr std::size_t value_index(std::uint32_t level, bool ratio, std::size_t c
 
 // ---- parts on disk
 
-/// Parts of a study in a folder: "louvres_wvds-mis_iid_200x150_seeds0-15.part". A part is a line with a checksum and a JSON
+/// Parts of a study in a folder: "louvres_wvds-mis_iid_200x150_seeds0-15.sums". A part is a line with a checksum and a JSON
 /// object with its settings and integers, written whole or not at all.
 class PartFolder {
 public:

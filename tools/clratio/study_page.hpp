@@ -1,4 +1,4 @@
-// The look of the report: its head, with all the style it needs.
+// The report's style and its sentences; {} are numbers of the run.
 #pragma once
 
 namespace tool::study {
@@ -55,5 +55,80 @@ blockquote{margin:.6rem 0;padding:0 0 0 1rem;border-left:3px solid var(--rule);f
 details{margin:1rem 0}summary{cursor:pointer;color:var(--accent);font-size:.9rem}
 code{font:.86em ui-monospace,"SF Mono",Menlo,Consolas,monospace;background:var(--wash);padding:.08em .3em;border-radius:3px}
 )css";
+
+constexpr auto page_introduction = R"html(<h1>Fog, shadows and ratio estimators</h1>
+<p class="lead">How fast do renderings of light scattered once in fog converge, and does dividing out the unshadowed noise
+help? Measured against exact answers.</p>
+<p>A camera looks into a box of fog. Sunlight enters, is scattered once and reaches the camera, unless a slat, a wall or a ball
+is in its way. Along each camera ray the renderer takes a few random points; <i>m</i> is the mean of the light from them with
+the shadows, <i>t</i> the mean without. The exact unshadowed light <i>τ</i> is known in closed form, and so the shadowed light
+can be estimated in two ways:</p>
+<p style="text-align:center"><i>plain mean</i>: m &emsp;&emsp; <i>ratio</i>: τ · m / t</p>
+<p>The ratio divides out what is noise in the fog and leaves what is noise in the shadow. In these scenes the shadowed light is
+known exactly, too: every error below is the true error of a pixel’s colour, not a difference from another noisy picture.</p>
+)html";
+
+constexpr auto page_run =
+    R"html(<p>This run rendered {} images of {} × {} pixels for each of {} estimators in {} scenes, with
+N = 1, 2, 4, .. 64 samples a pixel.{}</p>
+)html";
+
+constexpr auto page_contents = R"html(</ul>
+<nav><a href="#scenes">Scenes</a><a href="#claims">Claims</a><a href="#convergence">Convergence</a><a href="#tables">Error
+densities (Tables 1–4)</a><a href="#figures">Error laws (Figures 1, 2)</a><a href="#audit">The equations</a><a
+href="#colophon">How it was made</a></nav>
+)html";
+
+constexpr auto page_scenes = R"html(<h2 id="scenes">The scenes</h2>
+<p>One ray through the middle of each pixel, light scattered once. The third picture is what a renderer gives after four
+samples (WVDS, MIS), the fourth is made of the same numbers.</p>
+)html";
+
+constexpr auto page_claims = R"html(<h2 id="claims">Four claims, and what became of them</h2>
+<p>The supplement draws four conclusions from its tables. Here each is decided by the numbers of this run; two errors differ
+where they are 4 standard errors apart. <i>WVDS</i> draws distances by the fog toward both the light and the camera;
+<i>distance sampling</i> by the fog toward the camera alone: on an endless ray (untruncated) or within the box (truncated).</p>
+)html";
+
+constexpr auto page_convergence = R"html(<h2 id="convergence">Error against samples</h2>
+<p>Root mean squared error over all pixels whose rays meet the fog, all channels and images. Marks are measured. For
+independent samples the lines are not drawn through them: they are predicted from exact second moments, for the plain mean
+exactly, for the ratio to first order in 1/N. For ray marching, a grid with jitter, lines only join the marks.</p>
+<div class="key">)html";
+
+constexpr auto page_numbers = R"html(</div>
+<details><summary>The numbers: RMSE × 1000 of all estimators, and what the second moments predict at N = 64</summary>
+)html";
+
+constexpr auto page_numbers_end =
+    R"html(<p class="note">One standard error in the tooltip, from the spread of the images, whose
+channels and pixels are summed first. Values with heavy tails (independent t, WVDS mean in a dense medium) have no stable
+RMSE: the median size of an error is given in errors.csv.</p></details>
+)html";
+
+constexpr auto page_tables = R"html(<h2 id="tables">Densities of the error</h2>
+<p>Laid out as the supplement’s Tables 1 to 4: a row for each estimator, a column for each N. In each cell the error of red,
+green and blue goes upwards: above the dotted line a pixel is brighter than it should be, below it darker. To the right goes
+the density, as its square root, so that the flanks can be seen beside the peak. Each cell is drawn to its own peak: look at
+the shape and the spread; the number below is the RMSE × 1000. Pixels whose error is 0 are left out.</p>
+<p>The lobes of the ratio are no accident: with k of N samples in shadow the estimate is about τ(1 − k/N), so the errors of one
+pixel sit on a ladder of N + 1 rungs.</p>
+)html";
+
+constexpr auto page_figures = R"html(<h2 id="figures">The law of the error</h2>
+<p>Apart from scenes: if the means of m and t are normal, the law of the ratio’s error is known. Figure 1 has the exact laws
+for μ = 0.5, τ = 1, σ<sub>m</sub> = 0.5, σ<sub>t</sub> = 0.35 and independent m and t; dashes are eq. (22) as the supplement
+prints it, which lacks a factor. Figure 2 has {} sampled errors of each beside them.</p>
+<figure>{}<figcaption>Figure 1. Laws.</figcaption></figure>
+<figure>{}<figcaption>Figure 2. Samples.</figcaption></figure>
+)html";
+
+constexpr auto page_end = R"html(</table>
+<p class="note">Errors are counted on the device as whole numbers, so that errors.csv and densities.csv have the same bytes
+however the work is split, stopped and merged. The method is that of supplemental material IV of Velinov and Mitchell’s paper,
+doi 10.1109/TVCG.2021.3135764; scenes and numbers are this project’s own, and only the shape of the supplement’s tables can be
+compared.</p>
+</html>
+)html";
 
 }  // namespace tool::study

@@ -50,7 +50,7 @@ PartFolder::PartFolder(const std::string& folder, const Plan& plan) : folder_(fo
 
 std::string PartFolder::name_of(const Piece& p) const {
     const auto& sampler = p.series.sampler;
-    return fmt::format("{}_{}_{}_{}x{}_seeds{}-{}.part", plan_.scenes[p.series.scene].name,
+    return fmt::format("{}_{}_{}_{}x{}_seeds{}-{}.sums", plan_.scenes[p.series.scene].name,
                        clratio::name_of(sampler.sampling),
                        sampler.independent ? "independent" : std::string(clratio::name_of(sampler.pattern)),
                        plan_.frame.width, plan_.frame.height, p.seeds.first, p.seeds.first + p.seeds.count - 1);

@@ -129,31 +129,13 @@ std::string verdict_html(Verdict v) {
 
 void Page::introduction(const std::vector<Claim>& claims, const RunTimes& times) {
     const auto& plan = results_.plan;
-    add("<h1>Fog, shadows and ratio estimators</h1>\n<p class=\"lead\">How fast do renderings of light scattered once in "
-        "fog "
-        "converge, and does dividing out the unshadowed noise help? Measured against exact answers.</p>\n");
-    add("<p>A camera looks into a box of fog. Sunlight enters, is scattered once and reaches the camera, unless a slat, a "
-        "wall "
-        "or a ball is in its way. Along each camera ray the renderer takes a few random points; <i>m</i> is the mean of the "
-        "light from them with the shadows, <i>t</i> the mean without. The exact unshadowed light <i>τ</i> is known in "
-        "closed "
-        "form, and so the shadowed light can be estimated in two ways:</p>\n"
-        "<p style=\"text-align:center\"><i>plain mean</i>: m &emsp;&emsp; <i>ratio</i>: τ · m / t</p>\n"
-        "<p>The ratio divides out what is noise in the fog and leaves what is noise in the shadow. In these scenes the "
-        "shadowed "
-        "light is known exactly, too: every error below is the true error of a pixel’s colour, not a difference from "
-        "another "
-        "noisy picture.</p>\n");
-    add(fmt::format(
-        "<p>This run rendered {} images of {} × {} pixels for each of {} estimators in {} scenes, with N = 1, 2, 4, .. "
-        "64 samples a pixel.{}</p>\n",
-        plan.seeds, plan.frame.width, plan.frame.height, estimators_of(results_.scenes.front()).size(), plan.scenes.size(),
-        times.quick ? " It is the quick study: a full one has 128 images of 200 × 150." : ""));
+    add(page_introduction);
+    add(fmt::format(page_run, plan.seeds, plan.frame.width, plan.frame.height, estimators_of(results_.scenes.front()).size(),
+                    plan.scenes.size(),
+                    times.quick ? " It is the quick study: a full one has 128 images of 200 × 150." : ""));
     add("<h3>In short</h3>\n<ul>\n");
     for (const auto& claim : claims) add(fmt::format("<li>{} {}</li>\n", escaped(claim.said), escaped(claim.summary)));
-    add("</ul>\n<nav><a href=\"#scenes\">Scenes</a><a href=\"#claims\">Claims</a><a href=\"#convergence\">Convergence</a>"
-        "<a href=\"#tables\">Error densities (Tables 1–4)</a><a href=\"#figures\">Error laws (Figures 1, 2)</a>"
-        "<a href=\"#audit\">The equations</a><a href=\"#colophon\">How it was made</a></nav>\n");
+    add(page_contents);
 }
 
 double brightest(std::vector<float> values) {
@@ -188,9 +170,7 @@ void Page::shots(const SceneResult& scene) {
 }
 
 void Page::scenes() {
-    add("<h2 id=\"scenes\">The scenes</h2>\n<p>One ray through the middle of each pixel, light scattered once. The third "
-        "picture "
-        "is what a renderer gives after four samples (WVDS, MIS), the fourth is made of the same numbers.</p>\n");
+    add(page_scenes);
     for (const auto& scene : results_.scenes) {
         const auto& lit = scene.lit.front();
         add(fmt::format("<h3>{}</h3>\n", escaped(scene.named.title)));
@@ -207,11 +187,7 @@ void Page::scenes() {
 }
 
 void Page::claims(const std::vector<Claim>& claims) {
-    add("<h2 id=\"claims\">Four claims, and what became of them</h2>\n<p>The supplement draws four conclusions from its "
-        "tables. "
-        "Here each is decided by the numbers of this run; two errors differ where they are 4 standard errors apart. "
-        "<i>WVDS</i> draws distances by the fog toward both the light and the camera; <i>distance sampling</i> by the fog "
-        "toward the camera alone: on an endless ray (untruncated) or within the box (truncated).</p>\n");
+    add(page_claims);
     for (const auto& claim : claims) {
         add(fmt::format("<h3>({}) {}</h3>\n<p>{}</p>\n", claim.id, escaped(claim.said), escaped(claim.summary)));
         add(fmt::format("<details{}><summary>{} numbers</summary><div class=\"scroll\"><table class=\"findings\">\n",
@@ -238,12 +214,7 @@ void Page::convergence() {
                                   {{iid(Sampling::ds), true}, "c3"},
                                   {{iid(Sampling::wvds_mis), false}, "c4"},
                                   {{iid(Sampling::wvds_mis), true}, "c4"}};
-    add("<h2 id=\"convergence\">Error against samples</h2>\n<p>Root mean squared error over all pixels whose rays meet the "
-        "fog, "
-        "all channels and images. Marks are measured. For independent samples the lines are not drawn through them: they "
-        "are "
-        "predicted from exact second moments, for the plain mean exactly, for the ratio to first order in 1/N. For ray "
-        "marching, a grid with jitter, lines only join the marks.</p>\n<div class=\"key\">");
+    add(page_convergence);
     for (const auto& line : lines)
         add(key_of(line.colour_class + (line.estimator.ratio ? "" : " plain"), true,
                    title_of(line.estimator.sampler) + (line.estimator.ratio ? ", ratio" : ", plain mean")));
@@ -251,14 +222,9 @@ void Page::convergence() {
     for (const auto& scene : results_.scenes)
         add(fmt::format("<figure>{}<figcaption>{}</figcaption></figure>\n", convergence_plot(scene, lines),
                         escaped(scene.named.title)));
-    add("</div>\n<details><summary>The numbers: RMSE × 1000 of all estimators, and what the second moments predict at N = "
-        "64</summary>\n");
+    add(page_numbers);
     for (const auto& scene : results_.scenes) number_table(scene);
-    add("<p class=\"note\">One standard error in the tooltip, from the spread of the images, whose channels and pixels are "
-        "summed "
-        "first. Values with heavy tails (independent t, WVDS mean in a dense medium) have no stable RMSE: the median size "
-        "of "
-        "an error is given in errors.csv.</p></details>\n");
+    add(page_numbers_end);
 }
 
 void Page::number_table(const SceneResult& scene) {
@@ -312,28 +278,19 @@ void Page::density_table(const SceneResult& scene, std::size_t number) {
 }
 
 void Page::tables() {
-    add("<h2 id=\"tables\">Densities of the error</h2>\n<p>Laid out as the supplement’s Tables 1 to 4: a row for each "
-        "estimator, a "
-        "column for each N. In each cell the density of the error of red, green and blue is to the right, and the error "
-        "goes "
-        "upwards: above the dotted line a pixel is brighter than it should be, below it darker. Each cell is drawn to its "
-        "own "
-        "peak, so look at the shape and the spread; the number below is the RMSE × 1000. Pixels whose error is 0 are left "
-        "out, since their spike would flatten everything else.</p>\n"
-        "<p>The lobes of the ratio are no accident: with k of N samples in shadow the estimate is about τ(1 − k/N), so the "
-        "errors of one pixel sit on a ladder of N + 1 rungs.</p>\n");
+    add(page_tables);
     for (std::size_t i = 0; i < results_.scenes.size(); ++i) density_table(results_.scenes[i], i + 1);
+}
+
+/// 10<sup>6</sup>.
+std::string power_of_ten_html(std::uint64_t count) {
+    return fmt::format("10<sup>{:.0f}</sup>", std::log10(static_cast<double>(count)));
 }
 
 void Page::figures(std::uint64_t count) {
     const Figure figure = sampled_figure(engine_, {1}, count);
-    add(fmt::format(
-        "<h2 id=\"figures\">The law of the error</h2>\n<p>Apart from scenes: if the means of m and t are normal, the law "
-        "of the ratio’s error is known. Figure 1 has the exact laws for μ = 0.5, τ = 1, σ<sub>m</sub> = 0.5, "
-        "σ<sub>t</sub> = 0.35 and independent m and t; dashes are eq. (22) as the supplement prints it, which lacks "
-        "a factor. Figure 2 has {} sampled errors of each beside them.</p>\n<figure>{}<figcaption>Figure 1. Laws."
-        "</figcaption></figure>\n<figure>{}<figcaption>Figure 2. Samples.</figcaption></figure>\n",
-        count, panels(panels_of(figure, false)), panels(panels_of(figure, true))));
+    add(fmt::format(page_figures, power_of_ten_html(count), panels(panels_of(figure, false)),
+                    panels(panels_of(figure, true))));
 }
 
 void Page::audit() {
@@ -387,11 +344,7 @@ void Page::colophon(const RunTimes& times) {
                                                    times.samples, times.seconds, times.samples / times.seconds / 1e6)
                                      : "all taken from earlier runs");
     row("time", fmt::format("{:.0f} s up to this page, {}", times.whole, utc_now()));
-    add("</table>\n<p class=\"note\">Errors are counted on the device as whole numbers, so that errors.csv and "
-        "densities.csv have the "
-        "same bytes however the work is split, stopped and merged. The method is that of E. Velinov and K. Mitchell, "
-        "<i>Ratio estimators</i>, supplemental material IV (doi:10.1109/TVCG.2021.3135764); scenes and numbers are this "
-        "project’s own, and only the shape of the supplement’s tables can be compared.</p>\n</html>\n");
+    add(page_end);
 }
 
 }  // namespace

@@ -29,7 +29,7 @@ std::string outline(const std::vector<double>& density, double peak) {
     std::string path = "M0 0";
     int at = 0;
     for (std::size_t i = 0; i <= steps; ++i) {
-        const int x = i == steps ? 0 : static_cast<int>(std::lround(cell_width * density[i] / peak));
+        const int x = i == steps ? 0 : static_cast<int>(std::lround(cell_width * std::sqrt(density[i] / peak)));
         if (x == at && i < steps) continue;
         if (i > 0) path += fmt::format("V{}", i);
         if (x != at) path += fmt::format("H{}", x);
@@ -101,13 +101,11 @@ std::pair<double, double> decades_of(const SceneResult& scene, const std::vector
     return {std::floor(2 * least) / 2 - 0.05, std::ceil(2 * most) / 2 + 0.05};
 }
 
-std::string guide(const Axes& axes, double slope, const std::string& name) {
-    const double span = levels - 1, start = axes.y1 - 0.12 * (axes.y1 - axes.y0),
-                 end = start - slope * span * std::log10(2.0);
-    const double stop = end < axes.y0 ? (start - axes.y0) / (slope * std::log10(2.0)) : span;
-    const double y = start - slope * stop * std::log10(2.0);
-    return polyline(axes, {{0, start}, {stop, y}}, "guide") +
-           text(axes.x(0.12 * stop) + 6, axes.y(start - slope * 0.12 * stop * std::log10(2.0)) - 4, "label", name);
+/// A line that falls as N to the power of -slope, from `start` down to the edge.
+std::string guide(const Axes& axes, double start, double slope, const std::string& name) {
+    const double fall = slope * std::log10(2.0), end = std::min(levels - 1.0, (start - axes.y0) / fall);
+    return polyline(axes, {{0, start}, {end, start - fall * end}}, "guide") +
+           text(axes.x(0) + 4, axes.y(start) - 5, "label", name);
 }
 
 }  // namespace
@@ -130,7 +128,8 @@ std::string convergence_plot(const SceneResult& scene, const std::vector<Line>& 
             out += text(axes.left - 6, axes.y(v) + 4, "tick end", fmt::format("{:g}", digit * std::pow(10.0, decade)));
         }
     out += text((axes.left + axes.right) / 2, axes.bottom + 37, "label middle", "samples a pixel, N");
-    out += guide(axes, 0.5, "N^−½") + guide(axes, 1, "N^−1");
+    out += guide(axes, axes.y1 - 0.05 * (axes.y1 - axes.y0), 0.5, "1/√N") +
+           guide(axes, axes.y0 + 0.55 * (axes.y1 - axes.y0), 1, "1/N");
     for (const auto& line : lines) {
         const std::string classes = line.colour_class + (line.estimator.ratio ? "" : " plain");
         std::vector<std::pair<double, double>> measured, predicted;
