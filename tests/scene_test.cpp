@@ -59,9 +59,9 @@ void expect_same(const Scene& a, const Scene& b) {
     EXPECT_EQ(a.medium.light, b.medium.light);
     ASSERT_EQ(a.boxes.size(), b.boxes.size());
     for (std::size_t i = 0; i < a.boxes.size(); ++i)
-        for (std::size_t k = 0; k < 3; ++k) {  // one was written 1.06 + .08
-            EXPECT_DOUBLE_EQ(a.boxes[i].lo[k], b.boxes[i].lo[k]);
-            EXPECT_DOUBLE_EQ(a.boxes[i].hi[k], b.boxes[i].hi[k]);
+        for (std::size_t k = 0; k < 3; ++k) {  // sums such as 1.06 + .08 there
+            EXPECT_NEAR(a.boxes[i].lo[k], b.boxes[i].lo[k], 1e-15);
+            EXPECT_NEAR(a.boxes[i].hi[k], b.boxes[i].hi[k], 1e-15);
         }
     ASSERT_EQ(a.spheres.size(), b.spheres.size());
     for (std::size_t i = 0; i < a.spheres.size(); ++i) {
