@@ -260,6 +260,11 @@ TEST(Study, mistakes_are_named) {
     expect_refused(Words{"study", "--seeds", "0"} + to, 2, "--seeds");
     expect_refused(Words{"study", "--lanes", "3"} + to, 2, "width");
     expect_refused(Words{"study", "--merge", scratch / "none"} + to, 1, "none: cannot be merged");
+    json away = json::parse(bytes_of(std::string(CLRATIO_SOURCE) + "/tools/scenes/dense.json"));
+    away["camera"]["at"] = {-10, 1.4, -4};
+    put_bytes(scratch / "away.json", away.dump());
+    expect_refused(Words{"study", "--scenes", scratch / "away.json", "--size", "8x6"} + to, 2,
+                   "dense: no ray of the camera meets the fog");
     put_bytes(scratch / "file", "");
     expect_refused({"study", "-o", scratch / "file"}, 1, "cannot be made a folder");
 }

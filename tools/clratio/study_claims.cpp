@@ -46,7 +46,7 @@ Claim exact_in_the_light(const Results& results) {
             (sampling == Sampling::dsa ? untruncated_fails : all) &= sampling == Sampling::dsa ? !exact : exact;
             claim.findings.push_back(
                 {scene.named.name, std::string(clratio::name_of(sampling)), exact ? Verdict::holds : Verdict::fails,
-                 fmt::format("RMSE × 1000 of one sample on the {} of lit pixels: plain mean {:.4g}, ratio {:.4g}{}",
+                 fmt::format("RMSE × 1000 of one sample on lit pixels ({}): plain mean {:.4g}, ratio {:.4g}{}",
                              percent(lit.share), 1e3 * lit.plain, 1e3 * lit.ratio,
                              lit.empty > 0 ? fmt::format("; {} of all samples lie behind the medium", percent(lit.empty))
                                            : "")});
@@ -74,8 +74,10 @@ Verdict majority(const SceneResult& scene) {
 
 Finding few_samples(const SceneResult& scene) {
     std::string shares;
-    for (std::uint32_t level = 0; level < levels; ++level)
-        shares += fmt::format(" {:.2f}", all_of(scene, mis, level, true).bright);
+    for (std::uint32_t level = 0; level < levels; ++level) {
+        const double bright = all_of(scene, mis, level, true).bright;
+        shares += std::isnan(bright) ? " –" : fmt::format(" {:.2f}", bright);
+    }
     return {scene.named.name, "wvds-mis ratio", majority(scene),
             fmt::format("share of bright errors at N = 1 .. 64:{}; mean error × 1000 at N = 1: {}, at 4: {}", shares,
                         milli(all_of(scene, mis, 0, true).bias), milli(all_of(scene, mis, 2, true).bias))};

@@ -84,6 +84,10 @@ constexpr auto page_scenes = R"html(<h2 id="scenes">The scenes</h2>
 samples (WVDS, MIS), the fourth is made of the same numbers.</p>
 )html";
 
+constexpr auto page_scene = R"html(<p class="note">{} of {} rays meet the fog; {:.0f} % of these are fully lit. Extinction
+{:g}, {:g}, {:g}; scattering {:g}, {:g}, {:g}; g {:g}. Spheres: {}, boxes: {}. Name: <code>{}</code></p>
+)html";
+
 constexpr auto page_claims = R"html(<h2 id="claims">Four claims, and what became of them</h2>
 <p>The supplement draws four conclusions from its tables. Here each is decided by the numbers of this run; two errors differ
 where they are 4 standard errors apart. <i>WVDS</i> draws distances by the fog toward both the light and the camera;

@@ -45,6 +45,7 @@ Part compute(const clratio::MediumScene& scene, const NamedScene& named, const P
         clratio::medium_errors(scene, piece.series.sampler, piece.seeds, {}, {-named.range, named.range, bins}, options);
     Part part{piece.seeds.count, 0, errors.unit, errors.counts, {}};
     for (const auto pixels : errors.pixels) part.pixels += pixels;
+    if (part.pixels == 0) throw UsageError(named.name + ": no ray of the camera meets the fog, nothing to study");
     const std::size_t values = levels * std::size_t{6};
     part.sums.resize(piece.seeds.count * values);
     for (std::size_t i = 0; i < errors.sums.size(); ++i) {

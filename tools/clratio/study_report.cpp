@@ -176,13 +176,9 @@ void Page::scenes() {
         add(fmt::format("<h3>{}</h3>\n", escaped(scene.named.title)));
         shots(scene);
         const auto& m = scene.named.scene.medium;
-        add(fmt::format(
-            "<p class=\"note\">{} of {} rays meet the fog; {:.0f} % of these are fully lit. Extinction {:g}, {:g}, {:g}; "
-            "scattering {:g}, {:g}, {:g}; g {:g}; {} spheres, {} boxes. Written <code>{}</code> on the command "
-            "line.</p>\n",
-            scene.parts.front().pixels, results_.plan.frame.width * results_.plan.frame.height, 100 * lit.share,
-            m.sigma_t[0], m.sigma_t[1], m.sigma_t[2], m.sigma_s[0], m.sigma_s[1], m.sigma_s[2], m.g,
-            scene.named.scene.spheres.size(), scene.named.scene.boxes.size(), escaped(scene.named.name)));
+        add(fmt::format(page_scene, scene.parts.front().pixels, results_.plan.frame.width * results_.plan.frame.height,
+                        100 * lit.share, m.sigma_t[0], m.sigma_t[1], m.sigma_t[2], m.sigma_s[0], m.sigma_s[1], m.sigma_s[2],
+                        m.g, scene.named.scene.spheres.size(), scene.named.scene.boxes.size(), escaped(scene.named.name)));
     }
 }
 
@@ -235,7 +231,9 @@ void Page::number_table(const SceneResult& scene) {
         add(fmt::format("<tr><td>{}, {}", title_of(e.sampler), e.ratio ? "ratio" : "plain mean"));
         for (std::uint32_t level = 0; level < levels; ++level) {
             const auto s = statistics_of(scene.part(e.sampler), level, e.ratio, all_channels);
-            add(fmt::format("<td title=\"± {:.2g}\">{:.4g}", 1e3 * s.rmse.error, 1e3 * s.rmse.value));
+            add(std::isnan(s.rmse.error)
+                    ? fmt::format("<td>{:.4g}", 1e3 * s.rmse.value)
+                    : fmt::format("<td title=\"± {:.2g}\">{:.4g}", 1e3 * s.rmse.error, 1e3 * s.rmse.value));
         }
         const double predicted = predicted_rmse(scene, e, levels - 1, all_channels);
         add(std::isnan(predicted) ? std::string("<td>–") : fmt::format("<td>{:.4g}", 1e3 * predicted));

@@ -206,7 +206,8 @@ ScenePredictions predict_scene(const clratio::Scene& scene, clratio::Frame frame
             add(out.of[a].independent_mse, row.sums[a].independent_mse, 1 / rays);
             add(out.of[a].independent_bias, row.sums[a].independent_bias, 1 / rays);
             for (std::size_t ratio = 0; ratio < 2; ++ratio)
-                for (std::size_t b = 0; b < samplings; ++b) out.worse[ratio][a][b] += row.worse[ratio][a][b] / partial;
+                for (std::size_t b = 0; b < samplings; ++b)
+                    out.worse[ratio][a][b] += row.worse[ratio][a][b] / std::max(1.0, partial);
         }
     return out;
 }
