@@ -173,8 +173,10 @@ TEST(Study, goes_on_after_being_killed_at_any_moment) {
     const Words words = small + Words{"-o", scratch / "s"};
     std::mt19937 random(1);
     int killed = 0;
-    for (int i = 0; i < 6; ++i)
-        killed += run(words, {.signal = SIGKILL, .after = std::chrono::milliseconds(100 + random() % 900)}).code == 137;
+    for (int i = 0; i < 6; ++i) {
+        const auto moment = std::chrono::milliseconds(100 + random() % 900);
+        killed += run(words, {.signal = SIGKILL, .wait = [=] { std::this_thread::sleep_for(moment); }}).code == 137;
+    }
     answer(words);
     EXPECT_GT(killed, 0);
     EXPECT_EQ(Csv(scratch / "s"), whole());
@@ -184,7 +186,11 @@ TEST(Study, goes_on_after_being_killed_at_any_moment) {
 TEST(Study, stops_politely_and_says_how_to_go_on) {
     const Scratch scratch;
     const Words words{"study", "--scenes", "louvres", "--seeds", "4096", "--size", "100x75", "-o", scratch / "s"};
-    const Said said = run(words, {.signal = SIGINT, .after = std::chrono::milliseconds(1500)});
+    const auto first_part = [&] {
+        for (int i = 0; i < 3000 && !std::filesystem::exists(scratch / "s/parts/louvres_uni_iid_100x75_seeds0-15.sums"); ++i)
+            std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    };
+    const Said said = run(words, {.signal = SIGINT, .wait = first_part});
     EXPECT_EQ(said.code, 130) << said.err;
     EXPECT_NE(said.err.find("the same command goes on from there"), std::string::npos) << said.err;
 }
