@@ -9,6 +9,21 @@
 #include "tool.hpp"
 
 namespace tool {
+
+audit::Report audit::examine(const Work& work, const std::function<void(const char* part)>& tell) {
+    Report report{work.engine.info().name, work.samples};
+    const auto start = std::chrono::steady_clock::now();
+    const auto examine_part = [&](const char* name, auto findings) {
+        tell(name);
+        std::ranges::move(findings(work), std::back_inserter(report.findings));
+    };
+    examine_part("equations (1) to (13)", estimator_findings);
+    examine_part("equations (14) to (23)", law_findings);
+    examine_part("the figures", figure_findings);
+    report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return report;
+}
+
 namespace {
 
 struct Options {
@@ -18,24 +33,11 @@ struct Options {
 
 constexpr std::uint64_t quick_samples = 1'000'000;
 
-audit::Report examine(const Options& options) {
-    const audit::Work work{clratio::Engine{}, options.quick ? quick_samples : options.samples};
-    audit::Report report{work.engine.info().name, work.samples};
-    ProgressLine line;
-    const auto start = std::chrono::steady_clock::now();
-    const auto examine_part = [&](const char* name, auto findings) {
-        line.show(fmt::format("audit: {} ...", name));
-        std::ranges::move(findings(work), std::back_inserter(report.findings));
-    };
-    examine_part("equations (1) to (13)", audit::estimator_findings);
-    examine_part("equations (14) to (23)", audit::law_findings);
-    examine_part("the figures", audit::figure_findings);
-    report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    return report;
-}
-
 int audit_command(const Options& options) {
-    const audit::Report report = examine(options);
+    ProgressLine line;
+    const audit::Report report = audit::examine({clratio::Engine{}, options.quick ? quick_samples : options.samples},
+                                                [&](const char* part) { line.show(fmt::format("audit: {} ...", part)); });
+    line.clear();
     fmt::print("{}", options.json       ? audit::json_of(report)
                      : options.markdown ? audit::markdown_of(report)
                                         : audit::text_of(report));

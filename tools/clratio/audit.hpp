@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -87,7 +88,15 @@ struct Report {
     std::vector<Finding> findings{};
 };
 
+/// All findings; `tell` hears of each part before it starts.
+Report examine(const Work& work, const std::function<void(const char* part)>& tell);
+
 bool all_hold(const Report& report);
+/// "right", "right, misleading", "wrong".
+const char* name_of(Verdict verdict);
+/// A number and its error, what is expected of it, and what it would be if the supplement were right, for people.
+std::string value_of(const Number& number, const char* plus_minus);
+std::string expected_of(const Number& number);
 std::string text_of(const Report& report);
 std::string markdown_of(const Report& report);
 std::string json_of(const Report& report);

@@ -11,10 +11,6 @@ namespace {
 
 constexpr std::size_t columns = 100;
 
-const char* name_of(Verdict v) {
-    return v == Verdict::right ? "right" : v == Verdict::misleading ? "right, misleading" : "wrong";
-}
-
 const char* sign_of(Relation r) { return r == Relation::equal ? "=" : r == Relation::below ? "<" : ">"; }
 
 std::vector<std::string> wrap(const std::string& text, std::size_t width) {
@@ -38,6 +34,12 @@ std::string plain(const Number& n, double v) {
     return fmt::format("{:.{}g}", v, n.sampled ? 3 : 6);
 }
 
+}  // namespace
+
+const char* name_of(Verdict v) {
+    return v == Verdict::right ? "right" : v == Verdict::misleading ? "right, misleading" : "wrong";
+}
+
 std::string value_of(const Number& n, const char* plus_minus) {
     if (n.sampled && n.error > 0) return fmt::format("{} {} {:.2g}", plain(n, n.value), plus_minus, n.error);
     if (shows(n)) return fmt::format("{} ({:.2g})", plain(n, n.value), n.error);
@@ -50,6 +52,8 @@ std::string expected_of(const Number& n) {
         out = fmt::format("< {:.2g}", n.error);
     return out;
 }
+
+namespace {
 
 std::string refuted_of(const Number& n) { return n.refuted ? "not " + plain(n, *n.refuted) : ""; }
 

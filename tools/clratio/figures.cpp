@@ -1,4 +1,6 @@
 // clratio figures: the supplement's Figures 1 and 2 with the laws that are right beside those that were printed.
+#include "figures.hpp"
+
 #include <filesystem>
 
 #include "error_options.hpp"
@@ -20,8 +22,6 @@ clratio::ErrorModel model_of(std::uint64_t n) {
     return {.mu = .5, .tau = 1, .sigma_m = .5, .sigma_t = .35, .rho = 0, .n = n};
 }
 
-using Figure = std::vector<ErrorCounts>;  // those of mc, then those of the ratio
-
 Panel panel_of(const Figure& figure, Estimator estimator, bool samples) {
     const auto law_style = samples ? Curve::Style::thin : Curve::Style::line;
     Panel panel{estimator == Estimator::mc ? "Monte Carlo (MC)" : "Ratio estimator (RE)", most_density, lo, hi, {}};
@@ -41,8 +41,30 @@ Panel panel_of(const Figure& figure, Estimator estimator, bool samples) {
     return panel;
 }
 
+}  // namespace
+
+std::vector<Panel> panels_of(const Figure& figure, bool samples) {
+    return {panel_of(figure, Estimator::mc, samples), panel_of(figure, Estimator::ratio, samples)};
+}
+
+Figure sampled_figure(const clratio::Engine& engine, const clratio::Stream& stream, std::uint64_t count) {
+    Sampling sampling{stream, {0, count}, {lo, hi, bins}};
+    SampleProgress progress(static_cast<double>(sampling.range.count) * std::size(estimators) * std::size(sizes));
+    Figure figure;
+    for (const auto estimator : estimators)
+        for (const auto n : sizes) {
+            figure.push_back(with_usage_errors([&] {
+                return count_errors(engine, estimator, model_of(n), sampling, progress.next(sampling.range.count));
+            }));
+            ++sampling.stream.id;
+        }
+    return figure;
+}
+
+namespace {
+
 void draw_figure(const Figure& figure, const std::filesystem::path& stem, const std::string& title, bool samples) {
-    const Drawing drawing{title, {panel_of(figure, Estimator::mc, samples), panel_of(figure, Estimator::ratio, samples)}};
+    const Drawing drawing{title, panels_of(figure, samples)};
     for (const char* extension : {".svg", ".png"}) draw(drawing, stem.string() + extension);
 }
 
@@ -65,27 +87,13 @@ void write_samples(const Figure& figure, const std::string& file) {
     out.commit();
 }
 
-Figure sampled(const clratio::Engine& engine, const Options& options) {
-    Sampling sampling{options.stream.stream(), {0, whole_number("--count", options.count)}, {lo, hi, bins}};
-    SampleProgress progress(static_cast<double>(sampling.range.count) * std::size(estimators) * std::size(sizes));
-    Figure figure;
-    for (const auto estimator : estimators)
-        for (const auto n : sizes) {
-            figure.push_back(with_usage_errors([&] {
-                return count_errors(engine, estimator, model_of(n), sampling, progress.next(sampling.range.count));
-            }));
-            ++sampling.stream.id;
-        }
-    return figure;
-}
-
 int figures(const Options& options) {
     const std::filesystem::path folder = options.folder;
     std::error_code error;
     std::filesystem::create_directories(folder, error);
     if (error) throw clratio::IoError(options.folder, "", "cannot be made a folder: " + error.message());
     require_gnuplot(options.folder);
-    const Figure figure = sampled(clratio::Engine{}, options);
+    const Figure figure = sampled_figure(clratio::Engine{}, options.stream.stream(), whole_number("--count", options.count));
     const std::uint64_t count = figure.front().histogram.total();
     draw_figure(figure, folder / "figure1", "Figure 1: the law of the error after N samples", false);
     draw_figure(figure, folder / "figure2", "Figure 2: " + power_of_ten(count) + " sampled errors of each", true);

@@ -26,7 +26,7 @@ The environment variable CLRATIO_DEVICE ("0:0", "cpu", "gpu", or a part of a nam
 
 constexpr auto add_commands = {tool::add_devices,    tool::add_combine, tool::add_merge,  tool::add_compare,
                                tool::add_picture,    tool::add_law,     tool::add_errors, tool::add_figures,
-                               tool::add_estimators, tool::add_audit};
+                               tool::add_estimators, tool::add_audit,   tool::add_render, tool::add_study};
 
 int fail(const std::string& what, int code) {
     std::fputs(("clratio: " + what + "\n").c_str(), stderr);  // fmt::print would throw where nothing can be written

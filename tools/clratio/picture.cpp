@@ -1,11 +1,10 @@
 // clratio picture: images side by side as one PNG.
-#include <png.h>
-
 #include <cmath>
-#include <cstdio>
 
 #include "clratio/image.hpp"
 #include "label.hpp"
+#include "output_file.hpp"
+#include "png.hpp"
 #include "tool.hpp"
 
 namespace tool {
@@ -19,13 +18,6 @@ struct Options {
     std::string output, layer;
     double exposure = 0;  ///< stops
 };
-
-// IEC 61966-2-1. NaN and infinity have no colour: the caller marks them.
-std::uint8_t srgb(double linear) {
-    const double x = std::clamp(linear, 0.0, 1.0);
-    const double encoded = x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1 / 2.4) - 0.055;
-    return static_cast<std::uint8_t>(std::lround(255 * encoded));
-}
 
 void require_colour(const clratio::Image& image) {
     if (image.channels.size() != 1 && image.channels.size() != 3)
@@ -58,16 +50,6 @@ Canvas draw(const std::vector<clratio::Image>& images, const Options& options) {
     return canvas;
 }
 
-void write_png(const std::string& path, const Canvas& canvas) {
-    png_image png{};
-    png.version = PNG_IMAGE_VERSION;
-    png.width = static_cast<png_uint_32>(canvas.width());
-    png.height = static_cast<png_uint_32>(canvas.height());
-    png.format = PNG_FORMAT_RGB;
-    if (!png_image_write_to_file(&png, path.c_str(), 0, canvas.bytes(), 0, nullptr))
-        throw clratio::IoError(path, "", std::string("cannot be written: ") + png.message);
-}
-
 int picture(const Options& options) {
     if (!options.titles.empty() && options.titles.size() != options.images.size())
         throw UsageError(fmt::format("--titles has {} titles for {} images", options.titles.size(), options.images.size()));
@@ -78,7 +60,9 @@ int picture(const Options& options) {
         clratio::require_same_shape(images.front(), images.back());
     }
     const Canvas canvas = draw(images, options);
-    write_png(options.output, canvas);
+    OutputFile out(options.output);
+    out.write(png_of(canvas, options.output));
+    out.commit();
     fmt::print("{}: {} images, {}x{} pixels\n", options.output, images.size(), canvas.width(), canvas.height());
     return ok;
 }

@@ -39,6 +39,8 @@ void add_errors(CLI::App& app, Run& run);
 void add_figures(CLI::App& app, Run& run);
 void add_estimators(CLI::App& app, Run& run);
 void add_audit(CLI::App& app, Run& run);
+void add_render(CLI::App& app, Run& run);
+void add_study(CLI::App& app, Run& run);
 
 /// Keys in the order they were set, as a reader would want them.
 using Json = nlohmann::ordered_json;

@@ -1,0 +1,163 @@
+// The convergence study: what is run, in which pieces, and what is made of their integers.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "clratio/medium.hpp"
+#include "scene.hpp"
+#include "tool.hpp"
+
+namespace tool::study {
+
+constexpr std::uint32_t levels = clratio::most_levels;  ///< N = 1, 2, 4, .. 64
+constexpr std::uint32_t bins = 256;
+constexpr std::uint64_t seeds_a_piece = 16;
+/// 2^46 units of squared error a value at most: their sums over an image stay below 2^63.
+constexpr std::uint64_t most_pixels = (1u << 17) - 1;
+
+/// One way of estimating, in one scene.
+struct Series {
+    std::size_t scene = 0;
+    clratio::Sampler sampler;
+    bool operator==(const Series& o) const {
+        return scene == o.scene && sampler.sampling == o.sampler.sampling && sampler.pattern == o.sampler.pattern &&
+               sampler.independent == o.sampler.independent;
+    }
+};
+
+struct Plan {
+    std::vector<NamedScene> scenes;
+    clratio::Frame frame;
+    std::uint64_t seeds = 128;  ///< 0, 1, .. seeds - 1
+
+    /// Every sampling with iid samples; stratified and offset for uni, ds and wvds-mis; uni and wvds-mis with independent t.
+    std::vector<Series> series() const;
+};
+
+/// What is computed and saved in one go.
+struct Piece {
+    Series series;
+    clratio::IndexRange seeds;
+};
+
+/// All of a plan, series by series. The same seeds are always cut in the same places.
+std::vector<Piece> pieces_of(const Plan& plan);
+
+/// Exact integers of some images of one series.
+struct Part {
+    std::uint64_t seeds = 0, pixels = 0;  ///< pixels: whose rays hit the medium
+    double unit = 0;
+    std::vector<clratio::MediumErrorCounts> counts;  ///< levels x 6, as clratio::MediumErrors has them
+    std::vector<clratio::MediumErrorSums> sums;      ///< seeds x levels x 6
+
+    /// Adds the images of the seeds that follow.
+    Part& operator+=(const Part& next);
+};
+
+Part compute(const clratio::MediumScene& scene, const NamedScene& named, const Piece& piece,
+             const clratio::Progress& progress = {});
+
+/// Index into Part::counts, and into the sums of one seed.
+constexpr std::size_t value_index(std::uint32_t level, bool ratio, std::size_t channel) {
+    return level * std::size_t{6} + (ratio ? 3 : 0) + channel;
+}
+
+// ---- parts on disk
+
+/// Parts of a study in a folder: "louvres_wvds-mis_iid_200x150_seeds0-15.sums". A part is a line with a checksum and a JSON
+/// object with its settings and integers, written whole or not at all.
+class PartFolder {
+public:
+    /// Errors: IoError where the folder cannot be made.
+    PartFolder(const std::string& folder, const Plan& plan);
+
+    std::string name_of(const Piece& piece) const;
+    std::string path_of(const Piece& piece) const;
+    /// False where there is none, or a damaged one, or one of another scene of this name; into `part` otherwise.
+    bool read(const Piece& piece, Part& part) const;
+    void write(const Piece& piece, const Part& part) const;
+
+private:
+    Json settings_of(const Piece& piece) const;
+
+    std::string folder_;
+    Plan plan_;
+};
+
+// ---- what the integers say
+
+struct Estimate {
+    double value = 0, error = 0;  ///< one standard error, from the spread of the seeds; NaN for one seed
+};
+
+/// Errors of one series, level and estimator: of channel 0, 1, 2, or of all three together (3).
+struct Statistics {
+    Estimate mse, rmse, bias;
+    double median = 0, median_size = 0;  ///< of the errors, and of their absolute values, within a bin's width
+    double atom = 0;                     ///< the share of errors with |e| <= 1e-6
+    double bright = 0;                   ///< the share of positive ones among all others
+    double below = 0, above = 0;         ///< the shares outside the bins
+    double zero_denominators = 0;        ///< the share of values with sum t = 0
+    std::uint64_t values = 0;
+};
+constexpr std::size_t all_channels = 3;
+Statistics statistics_of(const Part& part, std::uint32_t level, bool ratio, std::size_t channel);
+
+/// Density over the bins, of one channel or all: count / (all errors x width).
+std::vector<double> density_of(const Part& part, std::uint32_t level, bool ratio, std::size_t channel);
+
+/// From the second moments: means over the pixels that hit, of squared errors and biases at N = 1. All go with 1 / N.
+struct Predicted {
+    std::array<double, 4> plain_mse{}, ratio_mse{}, ratio_bias{}, independent_mse{}, independent_bias{};
+};
+
+/// Where one sampling has the larger variance than another, as a share of the partly lit pixels' channels.
+struct ScenePredictions {
+    std::vector<Predicted> of;  ///< by Sampling
+    /// [plain or ratio][a][b]: a worse than b.
+    std::array<std::vector<std::vector<double>>, 2> worse;
+};
+ScenePredictions predict_scene(const clratio::Scene& scene, clratio::Frame frame);
+
+/// One sample in pixels with nothing in their way: root mean squared errors of the plain mean and of the ratio.
+struct LitErrors {
+    double plain = 0, ratio = 0;
+    double share = 0;  ///< of the rays that hit
+    double empty = 0;  ///< the share of all rays that hit whose only sample lies outside the medium
+};
+LitErrors lit_errors(const clratio::MediumScene& scene, clratio::Sampling sampling);
+
+struct SceneResult {
+    NamedScene named;
+    std::vector<Series> series;
+    std::vector<Part> parts;  ///< of the whole series, in its order
+    ScenePredictions predicted;
+    std::vector<LitErrors> lit;  ///< by Sampling
+
+    const Part& part(const clratio::Sampler& sampler) const;
+};
+
+struct Results {
+    Plan plan;
+    std::vector<SceneResult> scenes;
+};
+
+/// One line of a table: a sampler, and whether its m is divided by its t.
+struct Estimator {
+    clratio::Sampler sampler;
+    bool ratio = false;
+    std::string name() const;  ///< "wvds-mis iid ratio"
+};
+/// All of the study: independent samples only with the ratio.
+std::vector<Estimator> estimators_of(const SceneResult& scene);
+
+/// NaN where there is no prediction: patterns other than iid.
+double predicted_rmse(const SceneResult& scene, const Estimator& estimator, std::uint32_t level, std::size_t channel);
+double predicted_bias(const SceneResult& scene, const Estimator& estimator, std::uint32_t level, std::size_t channel);
+
+void write_errors_csv(const Results& results, const std::string& file);
+void write_densities_csv(const Results& results, const std::string& file);
+
+}  // namespace tool::study
