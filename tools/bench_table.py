@@ -40,6 +40,8 @@ def rows():
     yield from stream_rows()
     yield from medium_rows()
     yield from memory_rows()
+    yield from estimator_rows()
+    yield from fixed_rows()
     for law in ("pdf", "cdf"):
         yield Row(f"exact law, {law}, float", ("law", f"device/{law}"), peers={"host, one core, double": ("law", f"host/{law}")})
 
@@ -102,6 +104,19 @@ def memory_rows():
         for name, case in moments.items():
             yield Row(f"{name}, {power(size)}", ("moments", f"{case}/{size}"), ("moments", f"limit/{size}"), at_least,
                       unit="bytes")
+
+
+def estimator_rows():
+    """Estimate and error; those over groups read 8 of them."""
+    for name in ("mean", "ratio", "beale", "tin", "regression", "hartley-ross", "mean-of-ratios", "jackknife", "mickey",
+                 "crossfit-regression"):
+        yield Row(f"read out {name}, {power(LARGE)}", ("estimator", f"read_out/{name}/{LARGE}"),
+                  ("estimator", f"limit/{LARGE}"), 1 / 1.2, unit="bytes")
+
+
+def fixed_rows():
+    for name, case in {"add 1 batch": "add_fixed/1", "add 8 batches": "add_fixed/8", "merge": "merge_fixed", "moments()": "moments"}.items():
+        yield Row(f"fixed point, {name}, {power(LARGE)}", ("fixed", f"{case}/{LARGE}"), ("fixed", f"limit/{LARGE}"), unit="bytes")
 
 
 def power(size):
