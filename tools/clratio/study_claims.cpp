@@ -162,8 +162,10 @@ Finding fought(const SceneResult& scene, const Duel& duel, bool ratio) {
             fmt::format("{} against {} ({}), {}", clratio::name_of(duel.own.sampling), clratio::name_of(duel.other.sampling),
                         duel.name, ratio ? "ratio" : "plain mean"),
             v,
-            fmt::format("variance ratio {:.2f} at N = 64, {:.2f} by the second moments; worse in {} of partly lit values",
-                        x.value / y.value, pa[all_channels] / pb[all_channels], percent(p.worse[ratio][a][b]))};
+            y.value > 0 ? fmt::format("variance ratio {:.2f} at N = 64, {:.2f} by the second moments; worse in {} of partly "
+                                      "lit values",
+                                      x.value / y.value, pa[all_channels] / pb[all_channels], percent(p.worse[ratio][a][b]))
+                        : "the other has no error"};
 }
 
 Claim beats_distance_sampling(const Results& results) {
@@ -202,7 +204,12 @@ const char* name_of(Verdict v) {
 }
 
 std::vector<Claim> claims_of(const Results& results) {
-    return {exact_in_the_light(results), bright_majority(results), one_sample(results), beats_distance_sampling(results)};
+    std::vector<Claim> claims{exact_in_the_light(results), bright_majority(results), one_sample(results),
+                              beats_distance_sampling(results)};
+    if (results.plan.seeds == 1)
+        for (const std::size_t compared : {2u, 3u})
+            claims[compared].summary = "Not decided: a single image of each has no standard error.";
+    return claims;
 }
 
 Json json_of(const Claim& claim) {
