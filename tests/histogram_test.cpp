@@ -174,7 +174,7 @@ TEST(Histogram, a_batch_is_its_models_one_by_one) {
     std::vector<Canonical> laws;
     for (std::uint64_t n = 1; n <= 300; ++n)
         laws.push_back(canonical({.mu = .5, .tau = 1, .sigma_m = .5, .sigma_t = .35, .n = n}));
-    for (const auto& shape : {all_shapes()[8], all_shapes()[9], all_shapes()[12]}) {
+    for (const Shape& shape : some_shapes()) {
         const Engine engine(shape.options);
         const auto batch = error_histograms(engine, laws, {3, 10}, {5, 999}, bins);
         ASSERT_EQ(batch.size(), laws.size());
@@ -212,7 +212,7 @@ TEST(Histogram, doubles_are_the_hosts) {
         const double x = error_sample_double(wide, {1}, 9 + i);
         ++want[x < -1.5 ? 1024u : x >= 1.5 ? 1025u : std::min(1023u, static_cast<unsigned>((x + 1.5) * (1024 / 3.0)))];
     }
-    for (const auto& shape : {all_shapes()[0], all_shapes()[1], all_shapes()[8]})
+    for (const Shape& shape : some_shapes())
         EXPECT_EQ(row_of(error_histogram(Engine(shape.options), wide, {1}, {9, 20000}, bins,
                                          {.precision = Precision::double_precision})),
                   want)
