@@ -18,7 +18,7 @@ View words_view(cl_mem words, std::uint64_t count) { return {words, 0, count}; }
 bool wants_interval(const CombineOutput& out) { return out.lower.mem || out.upper.mem || out.kind; }
 bool wants_more(const CombineOutput& out) { return wants_interval(out) || out.bias.mem || out.gain.mem || out.needed.mem; }
 
-bool regresses(Estimator e) { return e == Estimator::regression || e == Estimator::crossfit_regression; }
+bool regresses(Estimator e) { return device::clr_is_regression(static_cast<std::uint32_t>(e)); }
 
 /// The interval's quantile for a value of so many batches.
 double quantile_for(const CombineOptions& options, std::uint64_t batches) {

@@ -1,6 +1,4 @@
 // The command line. A subcommand is one file with one add_ function; it is registered here.
-#include <malloc.h>
-
 #include <csignal>
 #include <cstdio>
 
@@ -61,20 +59,9 @@ int run_command(int argc, char** argv) {
     }
 }
 
-/// Images of one size come and go: without this each of them is mapped, zeroed page by page and unmapped again. Measured, a
-/// quarter of the device's share of a combine of two 3840x2160 batches.
-void keep_freed_memory() {
-#if defined(__GLIBC__)
-    constexpr int most = 1 << 26;
-    mallopt(M_MMAP_THRESHOLD, most);
-    mallopt(M_TRIM_THRESHOLD, 4 * most);
-#endif
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
-    keep_freed_memory();
     std::signal(SIGXFSZ, SIG_IGN);  // a file-size limit is an error of the write, not the end of the process
     const int code = run_command(argc, argv);
     if (std::fflush(stdout) != 0 || std::ferror(stdout)) return fail("standard output cannot be written", tool::failed);

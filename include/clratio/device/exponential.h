@@ -35,6 +35,19 @@ CLR_FN clr_real clr_exp(clr_real x) {
     return x == x ? scaled : x;
 }
 
+// (log(1 + f) - f + f^2 / 2) / f^3 for 1 + f in [sqrt(1/2), sqrt(2)].
+CLR_FN clr_real clr_log_polynomial(clr_real f) {
+    clr_real p = (clr_real)(-7.634499e-2f);
+    p = clr_fma(p, f, (clr_real)(1.2761578e-1f));
+    p = clr_fma(p, f, (clr_real)(-1.3160183e-1f));
+    p = clr_fma(p, f, (clr_real)(1.4201757e-1f));
+    p = clr_fma(p, f, (clr_real)(-1.6623357e-1f));
+    p = clr_fma(p, f, (clr_real)(2.0001227e-1f));
+    p = clr_fma(p, f, (clr_real)(-2.500082e-1f));
+    p = clr_fma(p, f, (clr_real)(3.333333e-1f));
+    return p;
+}
+
 // The natural logarithm within 1.1 ulp, subnormals included; -inf at 0, NaN below, +inf at +inf; NaN stays.
 CLR_FN clr_real clr_log(clr_real x) {
     const clr_real one = (clr_real)(1.0f), infinity = (clr_real)(INFINITY);
@@ -45,14 +58,7 @@ CLR_FN clr_real clr_log(clr_real x) {
     const clr_mask low_half = m < (clr_real)(0.707106781f);
     const clr_real f = (low_half ? m + m : m) - one;
     const clr_real e = low_half ? exponent - one : exponent;
-    clr_real p = (clr_real)(-7.634499e-2f);
-    p = clr_fma(p, f, (clr_real)(1.2761578e-1f));
-    p = clr_fma(p, f, (clr_real)(-1.3160183e-1f));
-    p = clr_fma(p, f, (clr_real)(1.4201757e-1f));
-    p = clr_fma(p, f, (clr_real)(-1.6623357e-1f));
-    p = clr_fma(p, f, (clr_real)(2.0001227e-1f));
-    p = clr_fma(p, f, (clr_real)(-2.500082e-1f));
-    p = clr_fma(p, f, (clr_real)(3.333333e-1f));
+    const clr_real p = clr_log_polynomial(f);
     const clr_real f2 = f * f;
     const clr_real tail = clr_fma(e, (clr_real)(CLR_LN2_LOW), clr_fma(f2 * f, p, (clr_real)(-0.5f) * f2));
     const clr_real y = clr_fma(e, (clr_real)(CLR_LN2_HIGH), f + tail);

@@ -110,14 +110,7 @@ CLR_FN clr_real clr_minus_log1p(clr_real t) {
     const clr_int e = clr_to_int(bits - (clr_uint)(0x3f3504f3u)) >> 23;
     const clr_real m = clr_from_bits(bits - (clr_to_uint(e) << 23));
     const clr_real f = e == (clr_int)(0) ? kept : m - (clr_real)(1.0f);
-    clr_real p = (clr_real)(-7.634499e-2f);
-    p = clr_fma(p, f, (clr_real)(1.2761578e-1f));
-    p = clr_fma(p, f, (clr_real)(-1.3160183e-1f));
-    p = clr_fma(p, f, (clr_real)(1.4201757e-1f));
-    p = clr_fma(p, f, (clr_real)(-1.6623357e-1f));
-    p = clr_fma(p, f, (clr_real)(2.0001227e-1f));
-    p = clr_fma(p, f, (clr_real)(-2.500082e-1f));
-    p = clr_fma(p, f, (clr_real)(3.333333e-1f));
+    const clr_real p = clr_log_polynomial(f);
     const clr_real square = f * f;
     const clr_real log_m = f + clr_fma(square * f, p, (clr_real)(-0.5f) * square);
     return clr_fma(clr_to_real(e), (clr_real)(-0.69314718f), -log_m);
