@@ -111,7 +111,11 @@ private:
 std::string program_options(const Moments::State& s, const Reading& reading) {
     const std::string groups = s.groups.size() > 1 ? "-DCLR_MANY_GROUPS" : "";
     if (wants_more(reading.out)) return groups;
-    return groups + " -DCLR_ESTIMATOR=" + std::to_string(static_cast<std::uint32_t>(reading.options.estimator)) + "u";
+    const auto define = [](const char* name, std::uint32_t value) {
+        return std::string(" -D") + name + "=" + std::to_string(value) + "u";
+    };
+    return groups + define("CLR_ESTIMATOR", static_cast<std::uint32_t>(reading.options.estimator)) +
+           define("CLR_ASKED", reading.asked()) + define("CLR_STATE_OPTIONS", s.all_groups().options);
 }
 
 Event read_moments(const Moments& moments, Reading reading, std::span<const cl_event> waits) {
@@ -192,8 +196,16 @@ void Reading::check(std::uint64_t count) const {
     output("flags", words_view(out.flags, count));
 }
 
+std::uint32_t Reading::asked() const {
+    const auto bit_if = [](bool wanted, std::uint32_t bit) { return wanted ? bit : 0u; };
+    return bit_if(out.estimate.mem, CLR_WRITE_ESTIMATE) | bit_if(out.standard_error.mem, CLR_WRITE_ERROR) |
+           bit_if(out.flags, CLR_WRITE_FLAGS) | bit_if(flag_rows, CLR_COUNT_FLAGS) |
+           bit_if(out.bias.mem, CLR_WRITE_BIAS) | bit_if(out.lower.mem, CLR_WRITE_LOWER) |
+           bit_if(out.upper.mem, CLR_WRITE_UPPER) | bit_if(out.kind, CLR_WRITE_KIND) |
+           bit_if(out.gain.mem, CLR_WRITE_GAIN) | bit_if(out.needed.mem, CLR_WRITE_NEEDED);
+}
+
 Launch& Reading::give(Launch& launch, const Moments::State& state, std::uint64_t added) const {
-    const auto write = [](bool wanted, std::uint32_t bit) { return wanted ? bit : 0u; };
     device::clr_reading r{};
     r.tau = layout(tau);
     r.estimate = layout(out.estimate);
@@ -206,11 +218,7 @@ Launch& Reading::give(Launch& launch, const Moments::State& state, std::uint64_t
     r.ask.estimator = static_cast<std::uint32_t>(options.estimator);
     r.ask.zero_policy = zero_policy(options.zero);
     r.ask.interval = static_cast<std::uint32_t>(options.method);
-    r.ask.outputs = write(out.estimate.mem, CLR_WRITE_ESTIMATE) | write(out.standard_error.mem, CLR_WRITE_ERROR) |
-                    write(out.flags, CLR_WRITE_FLAGS) | write(out.bias.mem, CLR_WRITE_BIAS) |
-                    write(out.lower.mem, CLR_WRITE_LOWER) | write(out.upper.mem, CLR_WRITE_UPPER) |
-                    write(out.kind, CLR_WRITE_KIND) | write(out.gain.mem, CLR_WRITE_GAIN) |
-                    write(out.needed.mem, CLR_WRITE_NEEDED);
+    r.ask.outputs = asked();
     r.ask.counted = options.counted;
     r.ask.target = options.target;
     r.ask.relative_target = options.relative_target;

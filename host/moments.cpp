@@ -13,7 +13,6 @@ using device::clr_two;
 
 static_assert(most_groups == CLR_MOST_GROUPS);
 
-constexpr std::uint64_t widest = 32;  // lanes; planes are padded to it, so that kernels load and store whole vectors
 
 clr_two two_float(double x) {
     const auto hi = static_cast<float>(x);
@@ -96,6 +95,23 @@ std::shared_ptr<Moments::State> make_state(const Engine& engine, std::uint64_t v
     return s;
 }
 
+/// What the kernel would work out for each vector.
+void describe_members(device::clr_groups& all) {
+    using namespace device;
+    const auto weight_of = [&](std::uint32_t g) { return clr_two{all.of[g].weight_hi, all.of[g].weight_lo}; };
+    clr_two sum = weight_of(0);
+    std::vector<clr_entry> entries{{}};
+    for (std::uint32_t g = 1; g < all.count; ++g) {
+        const clr_two before = sum;
+        sum = clr_two_add(sum, weight_of(g));
+        entries.push_back(clr_entry_make(before, weight_of(g), sum));
+    }
+    for (std::uint32_t g = 0; g < all.count; ++g) {
+        const clr_part part = clr_part_of(weight_of(g), sum);
+        all.member[g] = {entries[g].share.hi, entries[g].share.lo, entries[g].spread.hi, entries[g].spread.lo, part.p, part.a};
+    }
+}
+
 }  // namespace
 
 std::uint64_t Moments::State::batches() const {
@@ -106,7 +122,6 @@ std::uint64_t Moments::State::batches() const {
 
 device::clr_groups Moments::State::all_groups() const {
     device::clr_groups all{};
-    all.stride = plane_stride(values);
     all.options = (options.nonfinite == NonFinite::skip ? CLR_STATE_PER_VALUE : 0u) |
                   (options.ratios ? CLR_STATE_RATIOS : 0u) |
                   (options.weights == Weights::reliability ? CLR_STATE_RELIABILITY : 0u);
@@ -114,12 +129,45 @@ device::clr_groups Moments::State::all_groups() const {
     for (std::size_t g = 0; g < groups.size(); ++g)
         all.of[g] = {static_cast<std::uint32_t>(groups[g].batches), groups[g].weight.hi, groups[g].weight.lo,
                      groups[g].weight2.hi, groups[g].weight2.lo};
+    describe_members(all);
     return all;
 }
 
 device::clr_state Moments::State::state_of(std::size_t group) const {
     const auto all = all_groups();
-    return {2 * group * all.stride, all.stride, all.of[group], all.options};
+    return {static_cast<std::uint32_t>(group), all.count, all.of[group], all.options};
+}
+
+namespace {
+
+/// A plane's tiles as the rows of a rectangle on the device.
+struct Rectangle {
+    Rectangle(const PlanePart& part, std::uint64_t values, std::size_t groups)
+        : origin{part.number * row, 0, 0}, region{row, (values + CLR_TILE - 1) / CLR_TILE, 1},
+          pitch(part.parts * groups * row) {}
+    static constexpr std::size_t row = CLR_TILE * sizeof(float);
+    std::array<std::size_t, 3> origin, region, host_origin{};
+    std::size_t pitch;
+};
+
+}  // namespace
+
+void Moments::State::read_plane(const PlanePart& part, std::span<std::uint32_t> words) const {
+    const Rectangle r(part, values, groups.size());
+    std::vector<std::uint32_t> tiles(plane_stride(values));
+    check(clEnqueueReadBufferRect(engine.queue(), part.plane, CL_TRUE, r.origin.data(), r.host_origin.data(),
+                                  r.region.data(), r.pitch, 0, r.row, 0, tiles.data(), 0, nullptr, nullptr),
+          "clEnqueueReadBufferRect");
+    std::copy_n(tiles.begin(), values, words.begin());
+}
+
+void Moments::State::write_plane(const PlanePart& part, std::span<const std::uint32_t> words) const {
+    const Rectangle r(part, values, groups.size());
+    std::vector<std::uint32_t> tiles(plane_stride(values));
+    std::copy(words.begin(), words.end(), tiles.begin());
+    check(clEnqueueWriteBufferRect(engine.queue(), part.plane, CL_TRUE, r.origin.data(), r.host_origin.data(),
+                                   r.region.data(), r.pitch, 0, r.row, 0, tiles.data(), 0, nullptr, nullptr),
+          "clEnqueueWriteBufferRect");
 }
 
 Launch& Moments::State::give_planes(Launch& launch) const {
@@ -185,7 +233,7 @@ Moments::Moments(const Engine& engine, std::uint64_t values, MomentsOptions opti
     }
 }
 
-std::uint64_t Moments::plane_stride(std::uint64_t values) { return (values + widest - 1) / widest * widest; }
+std::uint64_t Moments::plane_stride(std::uint64_t values) { return (values + CLR_TILE - 1) / CLR_TILE * CLR_TILE; }
 std::uint64_t Moments::plane_bytes(std::uint64_t values) { return plane_stride(values) * 2 * sizeof(float); }
 
 std::uint64_t Moments::state_bytes(std::uint64_t values, MomentsOptions options) {
@@ -292,15 +340,12 @@ std::vector<std::uint32_t> Moments::bits(cl_mem StatePlanes::*plane) const {
     const auto& s = *state_;
     const cl_mem mem = s.planes.*plane;
     if (!mem) return {};
-    const std::size_t parts = (plane == &StatePlanes::batches ? 1 : 2) * s.groups.size();
-    std::vector<std::uint32_t> out(parts * s.values);
+    const std::size_t parts = plane == &StatePlanes::batches ? 1 : 2;
+    std::vector<std::uint32_t> out(parts * s.groups.size() * s.values);
     wait(s.last);
-    for (std::size_t p = 0; p < parts; ++p) {
-        if (s.groups[p * s.groups.size() / parts].batches == 0) continue;
-        check(clEnqueueReadBuffer(s.engine.queue(), mem, CL_TRUE, p * plane_stride(s.values) * sizeof(float),
-                                  s.values * sizeof(float), out.data() + p * s.values, 0, nullptr, nullptr),
-              "clEnqueueReadBuffer");
-    }
+    for (std::size_t p = 0; p < parts * s.groups.size(); ++p)
+        if (s.groups[p / parts].batches != 0)
+            s.read_plane({mem, parts, p}, std::span(out).subspan(p * s.values, s.values));
     return out;
 }
 

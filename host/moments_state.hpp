@@ -10,6 +10,12 @@
 
 namespace clratio {
 
+/// Part `number` of the parts x groups in each tile of a plane.
+struct PlanePart {
+    cl_mem plane;
+    std::size_t parts, number;
+};
+
 struct Moments::State {
     State(const Engine& e, std::uint64_t count, MomentsOptions o) : engine(e), values(count), options(o) {}
 
@@ -29,6 +35,8 @@ struct Moments::State {
     std::uint64_t batches() const;
     device::clr_state state_of(std::size_t group) const;
     device::clr_groups all_groups() const;
+    void read_plane(const PlanePart& part, std::span<std::uint32_t> words) const;  ///< blocking
+    void write_plane(const PlanePart& part, std::span<const std::uint32_t> words) const;
     Launch& give_planes(Launch& launch) const;  ///< the CLR_PLANE_ARGUMENTS
 };
 
@@ -41,6 +49,7 @@ struct Reading {
     Buffer quantiles{};  ///< of the interval, where values differ in their number of batches
 
     void check(std::uint64_t count) const;
+    std::uint32_t asked() const;  ///< CLR_WRITE and CLR_COUNT bits
     Launch& give(Launch& launch, const Moments::State& state, std::uint64_t added) const;
 };
 

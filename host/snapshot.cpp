@@ -70,7 +70,7 @@ private:
 struct Place {
     const char* name;
     cl_mem StatePlanes::*plane;
-    std::uint64_t part;  ///< strides into the plane
+    std::size_t part;  ///< 0: hi, 1: lo
 };
 
 constexpr std::array places{
@@ -115,14 +115,12 @@ std::string in_group(std::size_t group, const std::string& name) {
     return group == 0 ? name : "g" + std::to_string(group) + "." + name;
 }
 
-/// Calls each(group, name of the plane, its device memory, byte offset there), group by group.
+/// Calls each(group, name of the plane, its part of the device memory), group by group.
 template <class Each> void for_planes(const Moments::State& s, Each each) {
     for (std::size_t g = 0; g < s.groups.size(); ++g)
         for (const Place& place : places_of(s.options)) {
-            const std::uint64_t parts = place.plane == &StatePlanes::batches ? 1 : 2;
-            const std::uint64_t strides = g * parts + place.part;
-            each(g, in_group(g, place.name), s.planes.*place.plane,
-                 strides * Moments::plane_stride(s.values) * sizeof(float));
+            const std::size_t parts = place.plane == &StatePlanes::batches ? 1 : 2;
+            each(g, in_group(g, place.name), PlanePart{s.planes.*place.plane, parts, g * parts + place.part});
         }
 }
 
@@ -194,12 +192,9 @@ Snapshot Moments::snapshot() const {
     wait(s.last);
     Snapshot out{"moments", s.values, settings_of(s.options), {}, negatives(), skipped(), {}};
     for (const auto& g : s.groups) out.groups.push_back({g.batches, g.weight.hi, g.weight.lo, g.weight2.hi, g.weight2.lo});
-    for_planes(s, [&](std::size_t group, const std::string& name, cl_mem from, std::uint64_t offset) {
+    for_planes(s, [&](std::size_t group, const std::string& name, const PlanePart& part) {
         auto& words = out.planes.emplace_back(Snapshot::Plane{name, std::vector<std::uint32_t>(s.values)}).words;
-        if (s.groups[group].batches == 0) return;  // its planes hold anything
-        check(clEnqueueReadBuffer(s.engine.queue(), from, CL_TRUE, offset, s.values * sizeof(float), words.data(), 0,
-                                  nullptr, nullptr),
-              "clEnqueueReadBuffer");
+        if (s.groups[group].batches != 0) s.read_plane(part, words);  // else the plane holds anything
     });
     return out;
 }
@@ -213,18 +208,8 @@ Moments::Moments(const Engine& engine, const Snapshot& snapshot)
     check_words(snapshot);
     check_room(0, snapshot.batches());
     std::transform(snapshot.groups.begin(), snapshot.groups.end(), s.groups.begin(), group_of);
-    const std::vector<std::byte> padding((plane_stride(s.values) - s.values) * sizeof(float));
     auto plane = snapshot.planes.begin();
-    const auto write = [&](cl_mem to, std::uint64_t offset, const auto& words) {
-        const auto bytes = std::as_bytes(std::span(words));
-        if (bytes.empty()) return;
-        check(clEnqueueWriteBuffer(engine.queue(), to, CL_TRUE, offset, bytes.size(), bytes.data(), 0, nullptr, nullptr),
-              "clEnqueueWriteBuffer");
-    };
-    for_planes(s, [&](std::size_t, const std::string&, cl_mem to, std::uint64_t offset) {
-        write(to, offset, (plane++)->words);
-        write(to, offset + s.values * sizeof(float), padding);
-    });
+    for_planes(s, [&](std::size_t, const std::string&, const PlanePart& part) { s.write_plane(part, (plane++)->words); });
     std::array<std::uint64_t, CLR_TALLY_ADD> tallies{};
     tallies[CLR_TALLY_NEGATIVE] = snapshot.negatives;
     tallies[CLR_TALLY_SKIPPED] = snapshot.skipped;

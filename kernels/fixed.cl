@@ -137,7 +137,7 @@ kernel void clr_read_fixed(CLR_FIXED_ARGUMENTS(s), global const ulong* from_rows
     for (ulong v = span.begin; v < span.end; v += span.step) {
         const ulong first = v * CLR_WIDTH;
         const clr_fixed sum = clr_load_fixed(from, s_state, first);
-        clr_store_moments(clr_fixed_moments(sum, s_state.resolution), planes, to_state.stride, first);
+        clr_store_moments(clr_fixed_moments(sum, s_state.resolution), planes, to_state, first);
         if (s_state.per_value)
             clr_store_evidence(clr_fixed_weight(sum.weight), clr_both(0.0f, 0.0f), sum.batches, planes, to_state, first);
     }

@@ -80,7 +80,7 @@ static inline uint clr_pass(const bool is_first, const bool is_last, uint k, con
         } else if (skips && clr_any(doubt != (clr_real)(0.0f))) {
             doubtful |= 1u << v;
         } else {
-            clr_store_moments(moments, planes, s.stride, at);
+            clr_store_moments(moments, planes, s, at);
             if (skips) clr_store_evidence(sum, sum2, (clr_uint)(s.group.batches + batches->count), planes, s, at);
         }
     }
@@ -127,11 +127,11 @@ static inline void clr_add_vector(const clr_inputs* in, const clr_batches* batch
 kernel void clr_add(CLR_EACH_BATCH(CLR_BATCH_ARGUMENTS) clr_batches batches, CLR_PLANE_ARGUMENTS(s), clr_state s_state,
                     global ulong* add_rows, CLR_READING_ARGUMENTS, clr_range range) {
     const clr_inputs in = {{CLR_EACH_BATCH(CLR_M)}, {CLR_EACH_BATCH(CLR_T)}};
-    const clr_planes base = CLR_PLANES(s), planes = clr_planes_at(base, s_state.base);
+    const clr_planes planes = CLR_PLANES(s);
     const clr_outputs to = CLR_OUTPUTS;
     clr_question ask = reading.ask;
     ask.estimator = min(ask.estimator, CLR_ESTIMATOR_MEAN_OF_RATIOS);
-    ask.outputs &= CLR_WRITE_ESTIMATE | CLR_WRITE_ERROR | CLR_WRITE_FLAGS;
+    ask.outputs &= CLR_WRITE_ESTIMATE | CLR_WRITE_ERROR | CLR_WRITE_FLAGS | CLR_COUNT_FLAGS;
     const bool plain = batches.packed && !(s_state.options & CLR_STATE_RATIOS);
     const clr_batch last = batches.of[batches.count - 1];
     const clr_group grown = {s_state.group.batches + batches.count, last.sum_hi, last.sum_lo, last.sum2_hi, last.sum2_lo};
@@ -161,7 +161,8 @@ kernel void clr_add(CLR_EACH_BATCH(CLR_BATCH_ARGUMENTS) clr_batches batches, CLR
                 const clr_quotient q = clr_divide_means(r.moments.m, r.moments.t, control, ask.zero_policy);
                 const clr_evidence n = skips ? clr_evidence_of(r.batches, r.weight, r.weight2, ask.reliability) : whole;
                 const clr_estimate e =
-                    clr_read_out(r, q, n, clr_folds_begin(), reading.added, control, (clr_real)(0.0f), ask);
+                    clr_read_out(r, q, clr_residual_of(r.moments, q.quotient), n, clr_folds_begin(), reading.added, control,
+                                 (clr_real)(0.0f), ask);
                 clr_write_reading(e, reading, ask.outputs, to, &tally, at, range.count);
             }
         v += done * span.step;
@@ -175,8 +176,7 @@ kernel void clr_add(CLR_EACH_BATCH(CLR_BATCH_ARGUMENTS) clr_batches batches, CLR
 kernel void clr_merge(CLR_PLANE_ARGUMENTS(a), clr_state a_state, CLR_PLANE_ARGUMENTS(b), clr_state b_state, clr_batch entry,
                       global ulong* a_rows, global const ulong* b_rows, ulong row_words, clr_range range) {
     for (ulong i = get_global_id(0); i < row_words; i += get_global_size(0)) a_rows[i] += b_rows[i];
-    const clr_planes a_base = CLR_PLANES(a), b_base = CLR_PLANES(b);
-    const clr_planes to = clr_planes_at(a_base, a_state.base), from = clr_planes_at(b_base, b_state.base);
+    const clr_planes to = CLR_PLANES(a), from = CLR_PLANES(b);
     const clr_real zero = (clr_real)(0.0f);
     const bool skips = a_state.options & CLR_STATE_PER_VALUE;
     const clr_two whole = clr_both(entry.sum_hi, entry.sum_lo), whole2 = clr_both(entry.sum2_hi, entry.sum2_lo);
@@ -190,13 +190,13 @@ kernel void clr_merge(CLR_PLANE_ARGUMENTS(a), clr_state a_state, CLR_PLANE_ARGUM
         }
         const clr_entry e = clr_entry_of(&entry);
         const clr_moments moments = clr_load_moments(to, a_state, first), more = clr_load_moments(from, b_state, first);
-        clr_store_moments(clr_moments_merge(moments, more, e), to, a_state.stride, first);
+        clr_store_moments(clr_moments_merge(moments, more, e), to, a_state, first);
         if (skips)
             clr_store_evidence(whole, whole2, (clr_uint)(a_state.group.batches + b_state.group.batches), to, a_state, first);
         if (a_state.options & CLR_STATE_RATIOS) {
             const clr_ratios sum =
                 clr_ratios_merge(clr_load_ratios(to, a_state, first), clr_load_ratios(from, b_state, first), e);
-            clr_store_ratios(sum, to, a_state.stride, first);
+            clr_store_ratios(sum, to, a_state, first);
         }
     }
 }

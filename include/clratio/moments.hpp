@@ -49,10 +49,10 @@ struct HostBatch {
     std::optional<std::uint64_t> index{};
 };
 
-/// The device buffers of a state. A plane is plane_stride() float32 of hi parts, then as many lo parts; its value is hi +
-/// lo, where hi may be some ulps off the nearest float; `batches` is a single plane_stride() of uint32. With groups a buffer
-/// holds the planes of all groups one after the other. weight and batches exist with NonFinite::skip, weight2 if
-/// Weights::reliability is set besides, the last three with `ratios`; they are null otherwise.
+/// The device buffers of a state. Each lies in tiles of 32 values: for each group 32 float32 hi parts, then 32 lo parts; a
+/// value is hi + lo, where hi may be some ulps off the nearest float. `batches` has 32 uint32 for each group instead. weight
+/// and batches exist with NonFinite::skip, weight2 if Weights::reliability is set besides, the last three with `ratios`;
+/// they are null otherwise.
 struct StatePlanes {
     cl_mem m = nullptr, t = nullptr;                                    ///< means
     cl_mem mm = nullptr, tt = nullptr, mt = nullptr;                    ///< second moments about the means
@@ -81,7 +81,7 @@ public:
     /// The state that the snapshot was taken of, bit for bit. Errors: InvalidArgument where it does not fit together.
     Moments(const Engine& engine, const Snapshot& snapshot);
 
-    static std::uint64_t plane_stride(std::uint64_t values);  ///< elements
+    static std::uint64_t plane_stride(std::uint64_t values);  ///< values rounded up to whole tiles
     static std::uint64_t plane_bytes(std::uint64_t values);
     static std::uint64_t state_bytes(std::uint64_t values, MomentsOptions options = {});  ///< of all planes
 

@@ -55,7 +55,8 @@ inline device::clr_estimate read_twin(std::span<const TwinValue> groups, float t
             folds = clr_fold(folds, all.moments, q, g.record.moments, clr_part_of(g.record.weight, all.weight), tau,
                              ask.estimator);
     const clr_evidence n = clr_evidence_of(all.batches, all.weight, all.weight2, ask.reliability);
-    return clr_read_out(all, q, n, folds, offered, tau, quantile, ask);
+    const clr_residual d = clr_folds_residual(ask.estimator) ? folds.residual : clr_residual_of(all.moments, q.quotient);
+    return clr_read_out(all, q, d, n, folds, offered, tau, quantile, ask);
 }
 
 inline device::clr_estimate read_twin(const TwinValue& value, float tau, std::uint32_t estimator = CLR_ESTIMATOR_RATIO,

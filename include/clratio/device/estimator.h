@@ -36,6 +36,7 @@ CLR_NAMESPACE_BEGIN
 #define CLR_WRITE_KIND 64u
 #define CLR_WRITE_GAIN 128u
 #define CLR_WRITE_NEEDED 256u
+#define CLR_COUNT_FLAGS 512u  // of all values, without writing them
 #define CLR_WRITE_INTERVAL (CLR_WRITE_LOWER | CLR_WRITE_UPPER | CLR_WRITE_KIND)
 
 // What is asked of a state.
@@ -55,10 +56,28 @@ typedef struct {
     clr_uint kind, flags;
 } clr_estimate;
 
+CLR_FN bool clr_is_regression(clr_u32 estimator) {
+    return estimator == CLR_ESTIMATOR_REGRESSION || estimator == CLR_ESTIMATOR_CROSSFIT_REGRESSION;
+}
+
+CLR_FN bool clr_uses_groups(clr_u32 estimator) {
+    return estimator == CLR_ESTIMATOR_JACKKNIFE || estimator == CLR_ESTIMATOR_MICKEY ||
+           estimator == CLR_ESTIMATOR_CROSSFIT_REGRESSION;
+}
+
+CLR_FN bool clr_uses_ratios(clr_u32 estimator) {
+    return estimator == CLR_ESTIMATOR_MEAN_OF_RATIOS || estimator == CLR_ESTIMATOR_HARTLEY_ROSS;
+}
+
+// Those for whom clr_fold sums the residual of each group, so that nothing but means is merged.
+CLR_FN bool clr_folds_residual(clr_u32 estimator) {
+    return estimator == CLR_ESTIMATOR_JACKKNIFE || estimator == CLR_ESTIMATOR_MICKEY;
+}
+
 // How far batches vouch for their mean: Var(mean) = M2 scale, with sample counts 1 / ((K - 1) W). theory.md 4.
 typedef struct {
     clr_uint batches;
-    clr_real scale;  // 0 where there are fewer than two batches
+    clr_real weight, scale;  // scale is 0 where there are fewer than two batches
     clr_mask few;
 } clr_evidence;
 
@@ -66,6 +85,7 @@ CLR_FN clr_evidence clr_evidence_of(clr_uint batches, clr_two weight, clr_two we
     const clr_real zero = (clr_real)(0.0f), one = (clr_real)(1.0f);
     clr_evidence n;
     n.batches = batches;
+    n.weight = weight.hi;
     n.few = batches < (clr_uint)(2u);
     clr_real divisor = clr_to_real(batches - (clr_uint)(1u)) * weight.hi, numerator = one;
     if (reliability) {
@@ -91,15 +111,14 @@ typedef struct {
 } clr_residual;
 
 CLR_FN clr_residual clr_residual_of(clr_moments s, clr_two r) {
-    const clr_two mt = clr_two_subtract(s.mt, clr_two_multiply(r, s.tt));
-    const clr_two mm = clr_two_subtract(s.mm, clr_two_multiply(r, clr_two_add(s.mt, mt)));
+    const clr_two twice = clr_two_make(s.mt.hi + s.mt.hi, s.mt.lo + s.mt.lo), part = clr_two_multiply(r, s.tt);
     clr_residual d;
-    d.mm = mm.hi;
-    d.mt = mt.hi;
+    d.mm = clr_two_nearest(clr_two_apart(s.mm, clr_two_multiply(r, clr_two_apart(twice, part))));
+    d.mt = clr_two_nearest(clr_two_apart(s.mt, part));
     return d;
 }
 
-CLR_FN clr_real clr_slope(clr_quotient q) { return q.empty ? (clr_real)(1.0f) : clr_abs(q.control / q.denominator); }
+CLR_FN clr_real clr_slope(clr_quotient q) { return q.empty ? (clr_real)(1.0f) : clr_abs(q.control * q.inverse); }
 
 // ---- estimators of one record
 
@@ -111,7 +130,7 @@ CLR_FN clr_real clr_beale(clr_quotient q, clr_moments s, clr_residual d, clr_evi
 
 // Estimated bias of the ratio, to first order.
 CLR_FN clr_real clr_ratio_bias(clr_quotient q, clr_residual d, clr_evidence n) {
-    return -(q.control * (d.mt * n.scale) / (q.denominator * q.denominator));
+    return -((q.control * q.inverse) * (d.mt * n.scale) * q.inverse);
 }
 
 // Hartley and Ross 1954: unbiased with batches of equal weight, where m = 0 whenever t = 0.
@@ -125,18 +144,18 @@ CLR_FN clr_real clr_hartley_ross(clr_record r, clr_real tau) {
 // t - tau.
 CLR_FN clr_real clr_control_error(clr_two t, clr_real tau) { return (t.hi - tau) + t.lo; }
 
-CLR_FN clr_real clr_slope_of_regression(clr_two mt, clr_two tt) {
-    const clr_mask flat = !(tt.hi > (clr_real)(0.0f));
-    return flat ? (clr_real)(0.0f) : mt.hi / (flat ? (clr_real)(1.0f) : tt.hi);
+CLR_FN clr_real clr_slope_of_regression(clr_real mt, clr_real tt) {
+    const clr_mask flat = !(tt > (clr_real)(0.0f));
+    return flat ? (clr_real)(0.0f) : mt / (flat ? (clr_real)(1.0f) : tt);
 }
 
 // M2 of m about its regression on t.
 CLR_FN clr_real clr_regression_residual(clr_moments s) {
     const clr_mask flat = !(s.tt.hi > (clr_real)(0.0f));
     const clr_two divisor = clr_two_make(flat ? (clr_real)(1.0f) : s.tt.hi, flat ? (clr_real)(0.0f) : s.tt.lo);
-    const clr_two rest = clr_two_subtract(s.mm, clr_two_multiply(clr_two_divide(s.mt, divisor), s.mt));
+    const clr_real rest = clr_two_nearest(clr_two_apart(s.mm, clr_two_multiply(clr_two_divide(s.mt, divisor), s.mt)));
     const clr_real zero = (clr_real)(0.0f);
-    return flat ? s.mm.hi : (rest.hi > zero ? rest.hi : rest.hi * zero);
+    return flat ? s.mm.hi : (rest > zero ? rest : rest * zero);
 }
 
 // Eq. (5), tau mean(m / t), with the zero policy for each batch; the plain mean where tau == 0.
@@ -154,6 +173,7 @@ typedef struct {
     clr_real shift;          // sum of p e
     clr_real a, ae, aee;     // sums of a, a e, a e^2 with a = p / (1 - p)
     clr_real mickey, cross;  // sums of p (r_rest - r)(t - tau) and of p beta_rest (t - tau)
+    clr_residual residual;   // of all batches, without their merged moments
     clr_uint groups;         // that hold any weight
     clr_mask broken;         // a mean without one group was 0
 } clr_folds;
@@ -161,15 +181,15 @@ typedef struct {
 CLR_FN clr_folds clr_folds_begin(void) {
     const clr_real zero = (clr_real)(0.0f);
     clr_folds f;
-    f.shift = f.a = f.ae = f.aee = f.mickey = f.cross = zero;
+    f.shift = f.a = f.ae = f.aee = f.mickey = f.cross = f.residual.mm = f.residual.mt = zero;
     f.groups = (clr_uint)(0u);
     f.broken = clr_never();
     return f;
 }
 
 // M2 of all batches but the group's: Chan's merge backwards. `apart` is p / (1 - p) W times the product of the distances.
-CLR_FN clr_two clr_without(clr_two all, clr_two group, clr_real apart) {
-    return clr_two_subtract(clr_two_subtract(all, group), clr_two_make(apart, (clr_real)(0.0f)));
+CLR_FN clr_real clr_without(clr_two all, clr_two group, clr_real apart) {
+    return clr_two_nearest(clr_two_apart(clr_two_apart(all, group), clr_two_make(apart, (clr_real)(0.0f))));
 }
 
 // A group's part of the weight.
@@ -194,21 +214,23 @@ CLR_FN clr_part clr_part_of(clr_two group, clr_two all) {
 CLR_FN clr_folds clr_fold(clr_folds f, clr_moments all, clr_quotient q, clr_moments group, clr_part w, clr_real tau,
                           clr_u32 estimator) {
     const clr_real zero = (clr_real)(0.0f), one = (clr_real)(1.0f);
-    const clr_two dm = clr_two_subtract(group.m, all.m);
-    const clr_two dt = clr_two_subtract(group.t, all.t);
-    const clr_real beyond = clr_control_error(group.t, tau);
+    const clr_two dm = clr_two_apart(group.m, all.m), dt = clr_two_apart(group.t, all.t);
+    const clr_real far = clr_two_nearest(dt), beyond = clr_control_error(group.t, tau);
     f.groups += w.none ? (clr_uint)(0u) : (clr_uint)(1u);
     if (estimator == CLR_ESTIMATOR_CROSSFIT_REGRESSION) {
-        const clr_real apart = w.a * w.all * dt.hi;
-        const clr_two tt = clr_without(all.tt, group.tt, apart * dt.hi);
-        const clr_two mt = clr_without(all.mt, group.mt, apart * dm.hi);
+        const clr_real apart = w.a * w.all * far;
+        const clr_real tt = clr_without(all.tt, group.tt, apart * far);
+        const clr_real mt = clr_without(all.mt, group.mt, apart * clr_two_nearest(dm));
         f.cross = clr_fma(w.p * clr_slope_of_regression(mt, tt), beyond, f.cross);
         return f;
     }
-    const clr_two u = clr_two_subtract(dm, clr_two_multiply(q.quotient, dt));
-    const clr_real without = (q.denominator + all.t.lo) - w.a * dt.hi;
+    const clr_real u = clr_two_nearest(clr_two_apart(dm, clr_two_multiply(q.quotient, dt)));
+    const clr_residual within = clr_residual_of(group, q.quotient);
+    f.residual.mm += clr_fma(w.p * w.all * u, u, within.mm);
+    f.residual.mt += clr_fma(w.p * w.all * u, far, within.mt);
+    const clr_real without = (q.denominator + all.t.lo) - w.a * far;
     const clr_mask broken = !w.none && without == zero;
-    const clr_real e = -(u.hi / (without == zero ? one : without));
+    const clr_real e = -(u / (without == zero ? one : without));
     const clr_real kept = broken || w.none ? zero : e;
     f.broken = f.broken || broken;
     f.shift = clr_fma(w.p, kept, f.shift);
@@ -258,7 +280,7 @@ CLR_FN clr_interval clr_delta_interval(clr_real value, clr_real error, clr_real 
 // Fieller 1940, in units of the denominator: (r - g beta -+ sqrt(q^2 V_d - g q^2 V_reg)) / (1 - g), g = q^2 V_t / t^2.
 CLR_FN clr_interval clr_fieller_interval(clr_quotient q, clr_moments s, clr_residual d, clr_evidence n, clr_real quantile) {
     const clr_real zero = (clr_real)(0.0f), one = (clr_real)(1.0f);
-    const clr_real factor = quantile * quantile * n.scale / (q.denominator * q.denominator);
+    const clr_real factor = (quantile * q.inverse) * (quantile * q.inverse) * n.scale;
     const clr_real g = factor * s.tt.hi;
     const clr_real square = clr_fma(-g, factor * clr_regression_residual(s), factor * (d.mm > zero ? d.mm : zero));
     const clr_mask open = !(g < one), whole = q.empty || n.few || (open && !(square > zero));
@@ -269,19 +291,6 @@ CLR_FN clr_interval clr_fieller_interval(clr_quotient q, clr_moments s, clr_resi
 
 // ---- the read-out
 
-CLR_FN bool clr_is_regression(clr_u32 estimator) {
-    return estimator == CLR_ESTIMATOR_REGRESSION || estimator == CLR_ESTIMATOR_CROSSFIT_REGRESSION;
-}
-
-CLR_FN bool clr_uses_groups(clr_u32 estimator) {
-    return estimator == CLR_ESTIMATOR_JACKKNIFE || estimator == CLR_ESTIMATOR_MICKEY ||
-           estimator == CLR_ESTIMATOR_CROSSFIT_REGRESSION;
-}
-
-CLR_FN bool clr_uses_ratios(clr_u32 estimator) {
-    return estimator == CLR_ESTIMATOR_MEAN_OF_RATIOS || estimator == CLR_ESTIMATOR_HARTLEY_ROSS;
-}
-
 CLR_FN clr_real clr_value_of(clr_record r, clr_quotient q, clr_residual d, clr_evidence n, clr_folds f, clr_real tau,
                              clr_question ask) {
     if (ask.estimator == CLR_ESTIMATOR_MEAN) return r.moments.m.hi;
@@ -290,7 +299,7 @@ CLR_FN clr_real clr_value_of(clr_record r, clr_quotient q, clr_residual d, clr_e
     if (ask.estimator == CLR_ESTIMATOR_TIN) return q.value - clr_ratio_bias(q, d, n);
     if (ask.estimator == CLR_ESTIMATOR_HARTLEY_ROSS) return clr_hartley_ross(r, tau);
     if (ask.estimator == CLR_ESTIMATOR_REGRESSION) {
-        const clr_real beta = clr_slope_of_regression(r.moments.mt, r.moments.tt);
+        const clr_real beta = clr_slope_of_regression(r.moments.mt.hi, r.moments.tt.hi);
         return clr_fma(-beta, clr_control_error(r.moments.t, tau), r.moments.m.hi);
     }
     if (ask.estimator == CLR_ESTIMATOR_JACKKNIFE) return clr_jackknife(q, f);
@@ -308,18 +317,18 @@ CLR_FN clr_mask clr_falls_back(clr_evidence n, clr_folds f, clr_u32 estimator) {
 }
 
 // The standard error of finite data; the delta method's unless the estimator has one of its own.
-CLR_FN clr_real clr_error_of(clr_record r, clr_quotient q, clr_residual d, clr_evidence n, clr_folds f, clr_mask plain,
-                             clr_mask fallen, clr_u32 estimator) {
-    const clr_real mean = clr_root(r.moments.mm.hi * n.scale);
-    if (estimator == CLR_ESTIMATOR_MEAN) return mean;
-    if (clr_is_regression(estimator)) {
+CLR_FN clr_real clr_error_of(clr_record r, clr_quotient q, clr_residual d, clr_evidence n, clr_folds f, clr_mask fallen,
+                             clr_u32 estimator) {
+    if (estimator == CLR_ESTIMATOR_MEAN || clr_is_regression(estimator)) {
+        const clr_real mean = clr_root(r.moments.mm.hi * n.scale);
+        if (estimator == CLR_ESTIMATOR_MEAN) return mean;
         const clr_real k = clr_to_real(n.batches), one = (clr_real)(1.0f), two = (clr_real)(2.0f);
         const clr_mask few = n.batches < (clr_uint)(3u);
         const clr_real loss = few ? (clr_real)(INFINITY) : (k - one) / (few ? one : k - two);
         return fallen ? mean : clr_root(clr_regression_residual(r.moments) * n.scale * loss);
     }
-    const clr_real delta = plain ? mean : clr_slope(q) * clr_root(d.mm * n.scale);
-    if (estimator == CLR_ESTIMATOR_JACKKNIFE) return plain || fallen ? delta : clr_jackknife_error(q, f);
+    const clr_real delta = clr_slope(q) * clr_root(d.mm * n.scale);
+    if (estimator == CLR_ESTIMATOR_JACKKNIFE) return q.empty || fallen ? delta : clr_jackknife_error(q, f);
     return delta;
 }
 
@@ -338,16 +347,13 @@ CLR_FN clr_real clr_needed_of(clr_real value, clr_real error, clr_evidence n, cl
 }
 
 // Any of the estimators, with all flags. `added`: batches that were offered to the state; quantile: of the interval. Only
-// what ask.outputs names is computed, save value and flags; without CLR_WRITE_ERROR the error only says whether it is
-// infinite.
-CLR_FN clr_estimate clr_read_out(clr_record r, clr_quotient q, clr_evidence n, clr_folds f, clr_u32 added, clr_real tau,
-                                 clr_real quantile, clr_question ask) {
+// what ask.outputs names is computed, save the value; without CLR_WRITE_ERROR the error only says whether it is infinite.
+CLR_FN clr_estimate clr_read_out(clr_record r, clr_quotient q, clr_residual d, clr_evidence n, clr_folds f, clr_u32 added,
+                                 clr_real tau, clr_real quantile, clr_question ask) {
     const clr_real zero = (clr_real)(0.0f), infinite = (clr_real)(INFINITY);
     const bool is_mean = ask.estimator == CLR_ESTIMATOR_MEAN, averages = ask.estimator == CLR_ESTIMATOR_MEAN_OF_RATIOS;
     const bool divides = !is_mean && !averages && !clr_is_regression(ask.estimator);
     const clr_mask never = clr_never(), no_data = r.batches == (clr_uint)(0u);
-    const clr_residual d = clr_residual_of(r.moments, q.quotient);
-
     // Where eq. (10) gives the value by a rule of its own, so it does for its relatives.
     const clr_mask ruled = divides ? q.empty || tau == zero : never;
     const clr_mask fallen = clr_falls_back(n, f, ask.estimator) && !ruled;
@@ -361,7 +367,7 @@ CLR_FN clr_estimate clr_read_out(clr_record r, clr_quotient q, clr_evidence n, c
     const clr_mask unknown = averages ? clr_always() : n.few || replaced || too_few;
     e.error = unknown ? infinite : zero;
     if (ask.outputs & (CLR_WRITE_ERROR | CLR_WRITE_INTERVAL | CLR_WRITE_NEEDED)) {
-        const clr_real error = clr_error_of(r, q, d, n, f, q.empty, fallen, ask.estimator);
+        const clr_real error = clr_error_of(r, q, d, n, f, fallen, ask.estimator);
         e.error = unknown ? infinite : error;
     }
     e.bias = e.lower = e.upper = e.gain = e.needed = zero;
@@ -377,6 +383,8 @@ CLR_FN clr_estimate clr_read_out(clr_record r, clr_quotient q, clr_evidence n, c
         e.kind = c.kind;
     }
 
+    e.flags = (clr_uint)(0u);
+    if (!(ask.outputs & (CLR_WRITE_FLAGS | CLR_COUNT_FLAGS))) return e;
     const clr_uint rules = divides    ? clr_quotient_flags(q, tau)
                            : averages ? clr_flag_if(tau == zero, CLR_FLAG_ZERO_TAU)
                                       : (clr_uint)(0u);

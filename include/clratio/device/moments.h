@@ -67,10 +67,10 @@ CLR_FN clr_moments clr_moments_add(clr_moments s, clr_real m, clr_real t, clr_en
 }
 
 CLR_FN clr_moments clr_moments_merge(clr_moments a, clr_moments b, clr_entry e) {
-    a.mm = clr_two_add(a.mm, b.mm);
-    a.tt = clr_two_add(a.tt, b.tt);
-    a.mt = clr_two_add(a.mt, b.mt);
-    return clr_moments_settle(clr_moments_move(a, clr_two_subtract(b.m, a.m), clr_two_subtract(b.t, a.t), e));
+    a.mm = clr_two_gather(a.mm, b.mm);
+    a.tt = clr_two_gather(a.tt, b.tt);
+    a.mt = clr_two_gather(a.mt, b.mt);
+    return clr_moments_settle(clr_moments_move(a, clr_two_apart(b.m, a.m), clr_two_apart(b.t, a.t), e));
 }
 
 CLR_FN clr_two clr_two_advance(clr_two mean, clr_two to, clr_two share) {

@@ -33,18 +33,27 @@ typedef struct {
     float weight_hi, weight_lo, weight2_hi, weight2_lo;
 } clr_group;
 
-// One group of a state: where its planes begin, in elements of a two-float plane, and their stride.
+// A plane lies in tiles of CLR_TILE values: for each group in turn their hi parts, then their lo parts. So a pass over a
+// state reads few streams, in long runs, however many groups there are.
+#define CLR_TILE 32
+
+// One group of a state: its place among the groups of each tile.
 typedef struct {
-    clr_u64 base, stride;
+    clr_u32 place, groups;
     clr_group group;
     clr_u32 options;
 } clr_state;
 
-// All groups of a state, at bases 0, 2 stride, 4 stride ..
+// Where no value has skipped a batch: how a group joins those before it, and its clr_part of them all.
 typedef struct {
-    clr_u64 stride;
+    float share_hi, share_lo, spread_hi, spread_lo, p, a;
+} clr_member;
+
+// All groups of a state.
+typedef struct {
     clr_u32 options, count;
     clr_group of[CLR_MOST_GROUPS];
+    clr_member member[CLR_MOST_GROUPS];
 } clr_groups;
 
 typedef struct {
@@ -73,12 +82,14 @@ typedef struct {
 #define CLR_PLANES(s)                                                                                                       \
     { s##_m, s##_t, s##_mm, s##_tt, s##_mt, s##_weight, s##_weight2, s##_batches, s##_quotient, s##_zero_m, s##_zero_share }
 
-// The planes of one group.
-static inline clr_planes clr_planes_at(clr_planes p, ulong base) {
-    const clr_planes at = {p.m + base,        p.t + base,      p.mm + base,        p.tt + base,
-                           p.mt + base,       p.weight + base, p.weight2 + base,   p.batches + base / 2,
-                           p.quotient + base, p.zero_m + base, p.zero_share + base};
-    return at;
+// Where the values from i on have their elements in a plane of one element each; i is the first of a vector.
+static inline ulong clr_element(clr_state s, ulong i) {
+    return (i / CLR_TILE * s.groups + s.place) * CLR_TILE + i % CLR_TILE;
+}
+
+// The same for hi parts; lo parts are CLR_TILE further.
+static inline ulong clr_element_of_two(clr_state s, ulong i) {
+    return (i / CLR_TILE * s.groups + s.place) * (2 * CLR_TILE) + i % CLR_TILE;
 }
 
 static inline clr_two clr_both(float hi, float lo) { return clr_two_make((clr_real)(hi), (clr_real)(lo)); }
@@ -88,18 +99,16 @@ static inline clr_evidence clr_evidence_of_group(clr_group g, uint reliability) 
                            reliability);
 }
 
-static inline clr_two clr_load_two(global const float* p, ulong i, ulong stride) {
-    return clr_two_make(clr_load(p + i), clr_load(p + stride + i));
-}
-
-static inline void clr_store_two(clr_two v, global float* p, ulong i, ulong stride) {
-    clr_store(v.hi, p + i);
-    clr_store(v.lo, p + stride + i);
+static inline void clr_store_two(clr_two v, global float* p, clr_state s, ulong i) {
+    clr_store(v.hi, p + clr_element_of_two(s, i));
+    clr_store(v.lo, p + clr_element_of_two(s, i) + CLR_TILE);
 }
 
 // A group without batches is zero, whatever its planes hold: they are never cleared.
 static inline clr_two clr_load_plane(global const float* p, clr_state s, ulong i) {
-    return s.group.batches == 0 ? clr_both(0.0f, 0.0f) : clr_load_two(p, i, s.stride);
+    if (s.group.batches == 0) return clr_both(0.0f, 0.0f);
+    p += clr_element_of_two(s, i);
+    return clr_two_make(clr_load(p), clr_load(p + CLR_TILE));
 }
 
 static inline clr_moments clr_load_moments(clr_planes p, clr_state s, ulong i) {
@@ -112,19 +121,19 @@ static inline clr_moments clr_load_moments(clr_planes p, clr_state s, ulong i) {
     return r;
 }
 
-static inline void clr_store_moments(clr_moments s, clr_planes p, ulong stride, ulong i) {
-    clr_store_two(s.m, p.m, i, stride);
-    clr_store_two(s.t, p.t, i, stride);
-    clr_store_two(s.mm, p.mm, i, stride);
-    clr_store_two(s.tt, p.tt, i, stride);
-    clr_store_two(s.mt, p.mt, i, stride);
+static inline void clr_store_moments(clr_moments r, clr_planes p, clr_state s, ulong i) {
+    clr_store_two(r.m, p.m, s, i);
+    clr_store_two(r.t, p.t, s, i);
+    clr_store_two(r.mm, p.mm, s, i);
+    clr_store_two(r.tt, p.tt, s, i);
+    clr_store_two(r.mt, p.mt, s, i);
 }
 
 static inline void clr_store_evidence(clr_two weight, clr_two weight2, clr_uint batches, clr_planes p, clr_state s,
                                       ulong i) {
-    clr_store_two(weight, p.weight, i, s.stride);
-    if (s.options & CLR_STATE_RELIABILITY) clr_store_two(weight2, p.weight2, i, s.stride);
-    clr_store(clr_from_bits(batches), p.batches + i);
+    clr_store_two(weight, p.weight, s, i);
+    if (s.options & CLR_STATE_RELIABILITY) clr_store_two(weight2, p.weight2, s, i);
+    clr_store(clr_from_bits(batches), p.batches + clr_element(s, i));
 }
 
 static inline clr_ratios clr_load_ratios(clr_planes p, clr_state s, ulong i) {
@@ -136,13 +145,13 @@ static inline clr_ratios clr_load_ratios(clr_planes p, clr_state s, ulong i) {
 }
 
 static inline clr_uint clr_load_batches(clr_planes p, clr_state s, ulong i) {
-    return s.group.batches == 0 ? (clr_uint)(0u) : clr_bits(clr_load(p.batches + i));
+    return s.group.batches == 0 ? (clr_uint)(0u) : clr_bits(clr_load(p.batches + clr_element(s, i)));
 }
 
-static inline void clr_store_ratios(clr_ratios r, clr_planes p, ulong stride, ulong i) {
-    clr_store_two(r.quotient, p.quotient, i, stride);
-    clr_store_two(r.zero_m, p.zero_m, i, stride);
-    clr_store_two(r.zero_share, p.zero_share, i, stride);
+static inline void clr_store_ratios(clr_ratios r, clr_planes p, clr_state s, ulong i) {
+    clr_store_two(r.quotient, p.quotient, s, i);
+    clr_store_two(r.zero_m, p.zero_m, s, i);
+    clr_store_two(r.zero_share, p.zero_share, s, i);
 }
 
 static inline clr_record clr_load_record(clr_planes p, clr_state s, ulong i) {
@@ -162,9 +171,9 @@ static inline clr_record clr_load_record(clr_planes p, clr_state s, ulong i) {
 }
 
 static inline void clr_store_record(clr_record r, clr_planes p, clr_state s, ulong i) {
-    clr_store_moments(r.moments, p, s.stride, i);
+    clr_store_moments(r.moments, p, s, i);
     if (s.options & CLR_STATE_PER_VALUE) clr_store_evidence(r.weight, r.weight2, r.batches, p, s, i);
-    if (s.options & CLR_STATE_RATIOS) clr_store_ratios(r.ratios, p, s.stride, i);
+    if (s.options & CLR_STATE_RATIOS) clr_store_ratios(r.ratios, p, s, i);
 }
 
 static inline ulong clr_sum_lanes(clr_uint v) {
@@ -230,8 +239,9 @@ static inline void clr_write_reading(clr_estimate e, clr_reading reading, uint w
     if (wanted & CLR_WRITE_GAIN) clr_store_view(e.gain, to.gain, reading.gain, first, count);
     if (wanted & CLR_WRITE_NEEDED) clr_store_view(e.needed, to.needed, reading.needed, first, count);
     if (wanted & CLR_WRITE_FLAGS) clr_store_view(clr_from_bits(e.flags), to.flags, packed, first, count);
-    clr_count_flags(tally, first + CLR_WIDTH <= count ? e.flags : e.flags & clr_lanes_below(first, count),
-                    reading.ask.counted);
+    if (wanted & CLR_COUNT_FLAGS)
+        clr_count_flags(tally, first + CLR_WIDTH <= count ? e.flags : e.flags & clr_lanes_below(first, count),
+                        reading.ask.counted);
 }
 
 #endif

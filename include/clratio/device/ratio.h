@@ -36,22 +36,35 @@ CLR_FN clr_real clr_zero_value(clr_u32 policy, clr_real tau, clr_real m) {
     return policy == CLR_ZERO_ONE ? tau : (clr_real)(0.0f);
 }
 
-// Eq. (10): (tau + i) (m / (t + i)), the quotient first so that equal means give tau exactly.
+// Eq. (10): (tau + i) (m / (t + i)), the quotient first so that equal means give tau exactly. m / t is within 2^-44 of itself,
+// 1 where m = t, and 0 where t is 0. `scale` keeps the reciprocal of the smallest means finite.
 typedef struct {
     clr_two quotient;
-    clr_real control, denominator, value;
-    clr_mask empty;
+    clr_real control, denominator, value;  // tau + i; t + i, 1 where that is 0
+    clr_real inverse;                      // 1 / denominator
+    clr_mask empty;                        // t + i is 0
 } clr_quotient;
 
+// t + i, 1 where that is 0.
+CLR_FN clr_two clr_denominator_of(clr_two t, clr_real impulse) {
+    const clr_two sum = clr_two_sum(t.hi, impulse);
+    const clr_mask empty = sum.hi == (clr_real)(0.0f);
+    return clr_two_make(empty ? (clr_real)(1.0f) : sum.hi, sum.lo + t.lo);
+}
+
 CLR_FN clr_quotient clr_divide_means(clr_two m, clr_two t, clr_real tau, clr_u32 zero_policy) {
-    const clr_real impulse = clr_impulse(tau);
-    clr_two denominator = clr_two_add(t, clr_two_make(impulse, (clr_real)(0.0f)));
+    const clr_real zero = (clr_real)(0.0f), one = (clr_real)(1.0f), impulse = clr_impulse(tau);
+    const clr_two denominator = clr_denominator_of(t, impulse);
+    const clr_real scale = clr_abs(denominator.hi) < (clr_real)(0x1p-100f) ? (clr_real)(0x1p100f) : one;
+    const clr_real inverse = one / (denominator.hi * scale);
     clr_quotient q;
-    q.empty = denominator.hi == (clr_real)(0.0f);
-    denominator.hi = q.empty ? (clr_real)(1.0f) : denominator.hi;
-    q.quotient = clr_two_divide(m, denominator);
+    q.empty = t.hi + impulse == zero;
+    const clr_real first = m.hi / denominator.hi;
+    const clr_real rest = clr_fma(-first, denominator.hi, m.hi) + clr_fma(-first, denominator.lo, m.lo);
+    q.quotient = clr_two_make(q.empty ? zero : first, q.empty ? zero : (rest * scale) * inverse);
     q.control = tau + impulse;
     q.denominator = denominator.hi;
+    q.inverse = inverse * scale;
     const clr_two product = clr_two_product(q.control, q.quotient.hi);
     q.value = q.empty ? clr_zero_value(zero_policy, tau, m.hi) : product.hi + clr_fma(q.control, q.quotient.lo, product.lo);
     return q;

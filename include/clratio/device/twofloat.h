@@ -75,6 +75,15 @@ CLR_FN clr_two clr_two_distance(clr_real a, clr_two y) {
     return clr_two_make(s.hi, s.lo - y.lo);
 }
 
+// x - y as a loose pair, where both may be: rounding error below 2^-24 of the new lo.
+CLR_FN clr_two clr_two_apart(clr_two x, clr_two y) {
+    const clr_two s = clr_two_difference(x.hi, y.hi);
+    return clr_two_make(s.hi, s.lo + (x.lo - y.lo));
+}
+
+// The nearest float of a loose pair.
+CLR_FN clr_real clr_two_nearest(clr_two x) { return x.hi + x.lo; }
+
 // x * y as a loose pair; x and y may be loose: rounding error below 2^-24 of the new lo.
 CLR_FN clr_two clr_two_multiply(clr_two x, clr_two y) {
     const clr_two p = clr_two_product(x.hi, y.hi);
