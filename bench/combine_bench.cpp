@@ -1,5 +1,6 @@
 // Stateless combine, tau an image or a number: values/s and bytes/s beside the in-place scaling of as many bytes. Writing
-// over m, which is allowed, is in place as the limit is; another output costs the memory a third stream, not counted here.
+// over m, which is allowed, is in place as the limit is; another output costs the memory a third stream, not counted here. A
+// mix only reads and writes as combine does.
 #include "support/device.hpp"
 
 using namespace clratio;
@@ -30,6 +31,8 @@ void stateless(benchmark::State& state, bool tau_image, Output output) {
 
 void limit(benchmark::State& state, bool tau_image) { scaling_limit(state, bytes_moved(values_of(state), tau_image)); }
 
+void mix(benchmark::State& state, Mix m) { mixed_limit(state, values_of(state), m); }
+
 void sizes(benchmark::internal::Benchmark* b) {
     b->RangeMultiplier(10)->Range(100000, 100000000)->MeasureProcessCPUTime()->UseRealTime();
 }
@@ -37,6 +40,9 @@ void sizes(benchmark::internal::Benchmark* b) {
 }  // namespace
 
 BENCHMARK_CAPTURE(limit, tau_image, true)->Apply(sizes);
+BENCHMARK_CAPTURE(mix, tau_image, {3, 1, true})->Apply(sizes);
+BENCHMARK_CAPTURE(mix, tau_image_apart, {3, 1})->Apply(sizes);
+BENCHMARK_CAPTURE(mix, tau_number, {2, 1, true})->Apply(sizes);
 BENCHMARK_CAPTURE(stateless, tau_image, true, Output::over_m)->Apply(sizes);
 BENCHMARK_CAPTURE(stateless, tau_image_apart, true, Output::apart)->Apply(sizes);
 BENCHMARK_CAPTURE(limit, tau_number, false)->Apply(sizes);

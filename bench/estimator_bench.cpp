@@ -1,5 +1,5 @@
-// Reading each estimator and its error out of a state: values/s and bytes/s beside the in-place scaling of as many bytes as
-// the planes read and the images written.
+// Reading each estimator and its error out of a state: values/s and bytes/s beside two limits of as many bytes: reading and
+// adding up what the planes read, and scaling in place.
 #include "support/device.hpp"
 
 using namespace clratio;
@@ -16,15 +16,20 @@ MomentsOptions options_for(Estimator e) {
     return {.nonfinite = NonFinite::propagate, .ratios = needs.ratios, .groups = needs.groups ? groups : 1};
 }
 
-/// Planes, tau, the estimate and the error.
-std::uint64_t bytes_moved(std::uint64_t n, Estimator e) {
-    return Moments::state_bytes(n, options_for(e)) + (e == Estimator::mean_of_ratios ? 8 : 12) * n;
+/// What each value needs: the planes that the estimator uses, tau, the estimate and its error.
+Mix mix_of(Estimator e) {
+    if (e == Estimator::mean) return {4, 2};
+    if (e == Estimator::mean_of_ratios) return {7, 1};
+    if (e == Estimator::hartley_ross) return {13, 2};
+    return {10 * options_for(e).groups + 1, 2};
 }
+
+std::uint64_t bytes_moved(std::uint64_t n, Estimator e) { return 4 * n * (mix_of(e).reads + mix_of(e).writes); }
 
 void read_out(benchmark::State& state, Estimator e) {
     const Engine engine;
     const std::uint64_t n = values_of(state);
-    if (!fits(state, engine, bytes_moved(n, e), 8 * groups * n)) return;
+    if (!fits(state, engine, Moments::state_bytes(n, options_for(e)) + 16 * n, 8 * groups * n)) return;
     Moments moments(engine, n, options_for(e));
     const Array t(engine, n, 1.5f), tau(engine, n, 1.0f), out(engine, n, 0.0f), error(engine, n, 0.0f);
     const Batch batch{tau.view(), t.view()};
@@ -38,16 +43,20 @@ void read_out(benchmark::State& state, Estimator e) {
     report(state, n, bytes_moved(n, e));
 }
 
-void limit(benchmark::State& state) { scaling_limit(state, bytes_moved(values_of(state), Estimator::ratio)); }
+void in_place(benchmark::State& state) { scaling_limit(state, bytes_moved(values_of(state), Estimator::ratio)); }
+
+void mix(benchmark::State& state, Estimator e) { mixed_limit(state, values_of(state), mix_of(e)); }
 
 void sizes(benchmark::internal::Benchmark* b) {
     b->RangeMultiplier(10)->Range(100000, 10000000)->MeasureProcessCPUTime()->UseRealTime();
 }
 
 const bool registered = [] {
-    benchmark::RegisterBenchmark("limit", limit)->Apply(sizes);
-    for (const Estimator e : all_estimators())
+    benchmark::RegisterBenchmark("limit", in_place)->Apply(sizes);
+    for (const Estimator e : all_estimators()) {
+        benchmark::RegisterBenchmark(("mix/" + name_of(e)).c_str(), mix, e)->Apply(sizes);
         benchmark::RegisterBenchmark(("read_out/" + name_of(e)).c_str(), read_out, e)->Apply(sizes);
+    }
     return true;
 }();
 

@@ -1,4 +1,5 @@
-// Adding batches, merging, reading out: values/s and bytes/s beside the in-place scaling of as many bytes.
+// Adding batches, merging, reading out: values/s and bytes/s beside the in-place scaling of as many bytes, and a pass that
+// only reads and writes as they do.
 #include "support/device.hpp"
 
 using namespace clratio;
@@ -68,6 +69,8 @@ void read_out(benchmark::State& state, MomentsOptions options) {
 
 void limit(benchmark::State& state) { scaling_limit(state, add_bytes(values_of(state), 1, propagating)); }
 
+void mix(benchmark::State& state, Mix m) { mixed_limit(state, values_of(state), m); }
+
 void sizes(benchmark::internal::Benchmark* b) {
     b->RangeMultiplier(10)->Range(100000, 100000000)->MeasureProcessCPUTime()->UseRealTime();
 }
@@ -75,6 +78,14 @@ void sizes(benchmark::internal::Benchmark* b) {
 }  // namespace
 
 BENCHMARK(limit)->Apply(sizes);
+BENCHMARK_CAPTURE(mix, add_1, {12, 10, true})->Apply(sizes);
+BENCHMARK_CAPTURE(mix, add_8, {26, 10, true})->Apply(sizes);
+BENCHMARK_CAPTURE(mix, add_1_skip, {13, 13, true})->Apply(sizes);
+BENCHMARK_CAPTURE(mix, add_8_skip, {27, 13, true})->Apply(sizes);
+BENCHMARK_CAPTURE(mix, add_1_and_read_out, {13, 12, true})->Apply(sizes);
+BENCHMARK_CAPTURE(mix, merge, {20, 10, true})->Apply(sizes);
+BENCHMARK_CAPTURE(mix, read_out, {11, 2})->Apply(sizes);
+BENCHMARK_CAPTURE(mix, read_out_skip, {14, 2})->Apply(sizes);
 BENCHMARK_CAPTURE(add, 1, 1, propagating, false)->Apply(sizes);
 BENCHMARK_CAPTURE(add, 8, 8, propagating, false)->Apply(sizes);
 BENCHMARK_CAPTURE(add, 1_skip, 1, skipping, false)->Apply(sizes);

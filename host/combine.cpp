@@ -199,10 +199,10 @@ void Reading::check(std::uint64_t count) const {
 std::uint32_t Reading::asked() const {
     const auto bit_if = [](bool wanted, std::uint32_t bit) { return wanted ? bit : 0u; };
     return bit_if(out.estimate.mem, CLR_WRITE_ESTIMATE) | bit_if(out.standard_error.mem, CLR_WRITE_ERROR) |
-           bit_if(out.flags, CLR_WRITE_FLAGS) | bit_if(flag_rows, CLR_COUNT_FLAGS) |
-           bit_if(out.bias.mem, CLR_WRITE_BIAS) | bit_if(out.lower.mem, CLR_WRITE_LOWER) |
-           bit_if(out.upper.mem, CLR_WRITE_UPPER) | bit_if(out.kind, CLR_WRITE_KIND) |
-           bit_if(out.gain.mem, CLR_WRITE_GAIN) | bit_if(out.needed.mem, CLR_WRITE_NEEDED);
+           bit_if(out.flags, CLR_WRITE_FLAGS) | bit_if(flag_rows, CLR_COUNT_FLAGS) | bit_if(out.bias.mem, CLR_WRITE_BIAS) |
+           bit_if(out.lower.mem, CLR_WRITE_LOWER) | bit_if(out.upper.mem, CLR_WRITE_UPPER) |
+           bit_if(out.kind, CLR_WRITE_KIND) | bit_if(out.gain.mem, CLR_WRITE_GAIN) |
+           bit_if(out.needed.mem, CLR_WRITE_NEEDED);
 }
 
 Launch& Reading::give(Launch& launch, const Moments::State& state, std::uint64_t added) const {

@@ -13,7 +13,6 @@ using device::clr_two;
 
 static_assert(most_groups == CLR_MOST_GROUPS);
 
-
 clr_two two_float(double x) {
     const auto hi = static_cast<float>(x);
     return {hi, static_cast<float>(x - static_cast<double>(hi))};
@@ -108,7 +107,8 @@ void describe_members(device::clr_groups& all) {
     }
     for (std::uint32_t g = 0; g < all.count; ++g) {
         const clr_part part = clr_part_of(weight_of(g), sum);
-        all.member[g] = {entries[g].share.hi, entries[g].share.lo, entries[g].spread.hi, entries[g].spread.lo, part.p, part.a};
+        all.member[g] = {
+            entries[g].share.hi, entries[g].share.lo, entries[g].spread.hi, entries[g].spread.lo, part.p, part.a};
     }
 }
 
@@ -344,8 +344,7 @@ std::vector<std::uint32_t> Moments::bits(cl_mem StatePlanes::*plane) const {
     std::vector<std::uint32_t> out(parts * s.groups.size() * s.values);
     wait(s.last);
     for (std::size_t p = 0; p < parts * s.groups.size(); ++p)
-        if (s.groups[p / parts].batches != 0)
-            s.read_plane({mem, parts, p}, std::span(out).subspan(p * s.values, s.values));
+        if (s.groups[p / parts].batches != 0) s.read_plane({mem, parts, p}, std::span(out).subspan(p * s.values, s.values));
     return out;
 }
 

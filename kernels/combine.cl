@@ -14,8 +14,11 @@ kernel void clr_combine(global const float* m, clr_layout m_layout, global const
         const clr_plain_ratio r =
             clr_read_means(clr_load_view(m, m_layout, first, range.count), clr_load_view(t, t_layout, first, range.count),
                            clr_load_view(tau, tau_layout, first, range.count), zero_policy);
-        if (estimate) clr_store_view(r.value, estimate, estimate_layout, first, range.count);
-        if (flags) clr_store_view(clr_from_bits(r.flags), flags, packed, first, range.count);
+        if (estimate == m)
+            clr_store_view(r.value, estimate, estimate_layout, first, range.count);
+        else if (estimate)
+            clr_store_apart(r.value, estimate, estimate_layout, first, range.count);
+        if (flags) clr_store_apart(clr_from_bits(r.flags), flags, packed, first, range.count);
         clr_count_flags(&tally, first + CLR_WIDTH <= range.count ? r.flags : r.flags & clr_lanes_below(first, range.count),
                         0xffffffffu);
     }
@@ -99,8 +102,7 @@ kernel void clr_combine_moments(CLR_PLANE_ARGUMENTS(s), clr_groups groups, CLR_R
                              ask.estimator);
         }
 #endif
-        const clr_residual d =
-            clr_folds_residual(ask.estimator) ? folds.residual : clr_residual_of(all.moments, q.quotient);
+        const clr_residual d = clr_folds_residual(ask.estimator) ? folds.residual : clr_residual_of(all.moments, q.quotient);
         const clr_estimate e = clr_read_out(all, q, d, n, folds, reading.added, control,
                                             clr_quantile_for(all.batches, reading, quantiles), ask);
         clr_write_reading(e, reading, ask.outputs, to, &tally, first, range.count);

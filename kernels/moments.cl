@@ -160,9 +160,8 @@ kernel void clr_add(CLR_EACH_BATCH(CLR_BATCH_ARGUMENTS) clr_batches batches, CLR
                 r.moments = clr_moments_settle(r.moments);
                 const clr_quotient q = clr_divide_means(r.moments.m, r.moments.t, control, ask.zero_policy);
                 const clr_evidence n = skips ? clr_evidence_of(r.batches, r.weight, r.weight2, ask.reliability) : whole;
-                const clr_estimate e =
-                    clr_read_out(r, q, clr_residual_of(r.moments, q.quotient), n, clr_folds_begin(), reading.added, control,
-                                 (clr_real)(0.0f), ask);
+                const clr_estimate e = clr_read_out(r, q, clr_residual_of(r.moments, q.quotient), n, clr_folds_begin(),
+                                                    reading.added, control, (clr_real)(0.0f), ask);
                 clr_write_reading(e, reading, ask.outputs, to, &tally, at, range.count);
             }
         v += done * span.step;

@@ -32,6 +32,8 @@ class Row:
     peers: dict = field(default_factory=dict)  # name: (file, case)
     times_peer: tuple = None  # (name of peer, at least)
     unit: str = "items"
+    mix: tuple = None  # a pass that only reads and writes as the row does
+    at_least_of_mix: float = None
 
 
 def rows():
@@ -100,10 +102,11 @@ def memory_rows():
         at_least = 0.9 if size >= LARGE else None
         for name, (case, limit) in combine.items():
             yield Row(f"{name}, {power(size)}", ("combine", f"stateless/{case}/{size}"), ("combine", f"limit/{limit}/{size}"),
-                      at_least, unit="bytes")
+                      at_least, mix=("combine", f"mix/{case}/{size}"), unit="bytes")
         for name, case in moments.items():
+            mix = {"merge/propagate": "merge", "read_out/propagate": "read_out"}.get(case, case.replace("/", "_"))
             yield Row(f"{name}, {power(size)}", ("moments", f"{case}/{size}"), ("moments", f"limit/{size}"), at_least,
-                      unit="bytes")
+                      mix=("moments", f"mix/{mix}/{size}"), unit="bytes")
 
 
 def estimator_rows():
@@ -111,7 +114,7 @@ def estimator_rows():
     for name in ("mean", "ratio", "beale", "tin", "regression", "hartley-ross", "mean-of-ratios", "jackknife", "mickey",
                  "crossfit-regression"):
         yield Row(f"read out {name}, {power(LARGE)}", ("estimator", f"read_out/{name}/{LARGE}"),
-                  ("estimator", f"limit/{LARGE}"), 1 / 1.2, unit="bytes")
+                  ("estimator", f"limit/{LARGE}"), mix=("estimator", f"mix/{name}/{LARGE}"), at_least_of_mix=1 / 1.2, unit="bytes")
 
 
 def fixed_rows():
@@ -192,12 +195,16 @@ def rate_line(results, row):
     targets = []
     if limit and row.at_least:
         targets.append(verdict(ours.median / limit.median, row.at_least, "of the limit"))
+    mix = results.rate(row.mix, row.unit)
+    if mix and row.at_least_of_mix:
+        targets.append(verdict(ours.median / mix.median, row.at_least_of_mix, "of the mix"))
     if row.times_peer and row.times_peer[0] in peers:
         name, times = row.times_peer
         targets.append(verdict(ours.median / peers[name].median, times, f"x {name}"))
     return {
         "work": row.work, "unit": row.unit, "ours": ours.median, "spread": ours.spread,
         "limit": limit.median if limit else None, "of_limit": ours.median / limit.median if limit else None,
+        "mix": mix.median if mix else None, "of_mix": ours.median / mix.median if mix else None,
         "peers": {name: {"rate": peer.median, "times": ours.median / peer.median} for name, peer in peers.items()},
         "targets": targets,
     }
@@ -255,7 +262,7 @@ def si(rate, unit):
     return f"{rate:.3g} /s"
 
 
-RATE_HEADER = ["work", "this library", "spread", "limit", "of limit", "peers: rate (this library is .. times as fast)", "target"]
+RATE_HEADER = ["work", "this library", "spread", "limit", "of limit", "of mix", "peers: rate (this library is .. times as fast)", "target"]
 OTHER_HEADER = ["what", "measured", "target"]
 
 
@@ -263,7 +270,7 @@ def rate_cells(line):
     peers = "; ".join(f"{name} {si(p['rate'], line['unit'])} ({p['times']:.1f}x)" for name, p in line["peers"].items())
     return [line["work"], si(line["ours"], line["unit"]), f"{100 * line['spread']:.0f} %",
             si(line["limit"], line["unit"]) if line["limit"] else "", f"{line['of_limit']:.2f}" if line["limit"] else "",
-            peers, "; ".join(line["targets"])]
+            f"{line['of_mix']:.2f}" if line["mix"] else "", peers, "; ".join(line["targets"])]
 
 
 def other_cells(line):

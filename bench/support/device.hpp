@@ -33,6 +33,15 @@ bool fits(benchmark::State& state, const Engine& engine, std::uint64_t bytes, st
 /// items/s, bytes/s.
 void report(benchmark::State& state, std::uint64_t items, std::uint64_t bytes);
 
+/// Floats that a kernel reads and writes for each value; in_place: it writes over what it read.
+struct Mix {
+    std::uint32_t reads, writes;
+    bool in_place = false;
+};
+
+/// Moves as many floats, one after the other in memory, and only adds up what it reads.
+void mixed_limit(benchmark::State& state, std::uint64_t values, Mix mix);
+
 /// x *= 1.0000001 in place over arrays of `bytes / 2` in all: it moves `bytes`.
 void scaling_limit(benchmark::State& state, std::uint64_t bytes);
 

@@ -58,22 +58,10 @@ static inline clr_real clr_load_view(global const float* p, clr_layout view, ulo
     return clr_load(lane);
 }
 
-// Into a result of `count` values: a large one goes past the caches, which would read its lines before they are written.
-static inline void clr_store_result(clr_real v, global float* p, ulong count) {
-#if CLR_WIDTH == 32
-    if (count >= 1ul << 20 && ((ulong)p & 63) == 0) {
-        __builtin_nontemporal_store(v.lo, (global float16*)p);
-        __builtin_nontemporal_store(v.hi, (global float16*)(p + 16));
-        return;
-    }
-#endif
-    clr_store(v, p);
-}
-
 static inline void clr_store_view(clr_real v, global float* p, clr_layout view, ulong first, ulong count) {
     p += view.offset;
     if (view.stride == view.channels && first + CLR_WIDTH <= count) {
-        clr_store_result(v, p + first, count);
+        clr_store(v, p + first);
         return;
     }
     ulong pixel = first / view.channels;
@@ -87,6 +75,21 @@ static inline void clr_store_view(clr_real v, global float* p, clr_layout view, 
             ++pixel;
         }
     }
+}
+
+// The same for a view that no kernel argument reads: a large one goes past the caches, which would read each line before it
+// is written.
+static inline void clr_store_apart(clr_real v, global float* p, clr_layout view, ulong first, ulong count) {
+#if CLR_WIDTH == 32
+    global float* to = p + view.offset + first;
+    const bool large = count >= 1ul << 20, whole = view.stride == view.channels && first + CLR_WIDTH <= count;
+    if (large && whole && ((ulong)to & 63) == 0) {
+        __builtin_nontemporal_store(v.lo, (global float16*)to);
+        __builtin_nontemporal_store(v.hi, (global float16*)(to + 16));
+        return;
+    }
+#endif
+    clr_store_view(v, p, view, first, count);
 }
 
 #endif

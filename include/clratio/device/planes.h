@@ -230,15 +230,15 @@ static inline clr_real clr_quantile_for(clr_uint batches, clr_reading reading, g
 static inline void clr_write_reading(clr_estimate e, clr_reading reading, uint wanted, clr_outputs to, clr_flag_tally* tally,
                                      ulong first, ulong count) {
     const clr_layout packed = {0, 1, 1};
-    if (wanted & CLR_WRITE_ESTIMATE) clr_store_view(e.value, to.estimate, reading.estimate, first, count);
-    if (wanted & CLR_WRITE_ERROR) clr_store_view(e.error, to.error, reading.error, first, count);
-    if (wanted & CLR_WRITE_BIAS) clr_store_view(e.bias, to.bias, reading.bias, first, count);
-    if (wanted & CLR_WRITE_LOWER) clr_store_view(e.lower, to.lower, reading.lower, first, count);
-    if (wanted & CLR_WRITE_UPPER) clr_store_view(e.upper, to.upper, reading.upper, first, count);
-    if (wanted & CLR_WRITE_KIND) clr_store_view(clr_from_bits(e.kind), to.kind, packed, first, count);
-    if (wanted & CLR_WRITE_GAIN) clr_store_view(e.gain, to.gain, reading.gain, first, count);
-    if (wanted & CLR_WRITE_NEEDED) clr_store_view(e.needed, to.needed, reading.needed, first, count);
-    if (wanted & CLR_WRITE_FLAGS) clr_store_view(clr_from_bits(e.flags), to.flags, packed, first, count);
+    if (wanted & CLR_WRITE_ESTIMATE) clr_store_apart(e.value, to.estimate, reading.estimate, first, count);
+    if (wanted & CLR_WRITE_ERROR) clr_store_apart(e.error, to.error, reading.error, first, count);
+    if (wanted & CLR_WRITE_BIAS) clr_store_apart(e.bias, to.bias, reading.bias, first, count);
+    if (wanted & CLR_WRITE_LOWER) clr_store_apart(e.lower, to.lower, reading.lower, first, count);
+    if (wanted & CLR_WRITE_UPPER) clr_store_apart(e.upper, to.upper, reading.upper, first, count);
+    if (wanted & CLR_WRITE_KIND) clr_store_apart(clr_from_bits(e.kind), to.kind, packed, first, count);
+    if (wanted & CLR_WRITE_GAIN) clr_store_apart(e.gain, to.gain, reading.gain, first, count);
+    if (wanted & CLR_WRITE_NEEDED) clr_store_apart(e.needed, to.needed, reading.needed, first, count);
+    if (wanted & CLR_WRITE_FLAGS) clr_store_apart(clr_from_bits(e.flags), to.flags, packed, first, count);
     if (wanted & CLR_COUNT_FLAGS)
         clr_count_flags(tally, first + CLR_WIDTH <= count ? e.flags : e.flags & clr_lanes_below(first, count),
                         reading.ask.counted);

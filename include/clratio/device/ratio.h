@@ -36,8 +36,8 @@ CLR_FN clr_real clr_zero_value(clr_u32 policy, clr_real tau, clr_real m) {
     return policy == CLR_ZERO_ONE ? tau : (clr_real)(0.0f);
 }
 
-// Eq. (10): (tau + i) (m / (t + i)), the quotient first so that equal means give tau exactly. m / t is within 2^-44 of itself,
-// 1 where m = t, and 0 where t is 0. `scale` keeps the reciprocal of the smallest means finite.
+// Eq. (10): (tau + i) (m / (t + i)), the quotient first so that equal means give tau exactly. m / t is within 2^-44 of
+// itself, 1 where m = t, and 0 where t is 0. `scale` keeps the reciprocal of the smallest means finite.
 typedef struct {
     clr_two quotient;
     clr_real control, denominator, value;  // tau + i; t + i, 1 where that is 0
