@@ -77,7 +77,7 @@ std::string sealed(const std::string& body) {
     Checksum sum;
     sum.add(std::span<const char>(body));
     char head[96];
-    std::snprintf(head, sizeof head, "clratio study part 1, checksum %016llx, %zu bytes\n",
+    std::snprintf(head, sizeof head, "clratio study part 2, checksum %016llx, %zu bytes\n",
                   static_cast<unsigned long long>(sum.sum()), body.size());
     return head + body;
 }

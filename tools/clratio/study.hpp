@@ -14,6 +14,7 @@ namespace tool::study {
 constexpr std::uint32_t levels = clratio::most_levels;  ///< N = 1, 2, 4, .. 64
 constexpr std::uint32_t bins = 256;
 constexpr std::uint64_t seeds_a_piece = 16;
+constexpr std::size_t all_channels = 3;  ///< after r, g, b
 /// 2^46 units of squared error a value at most: their sums over an image stay below 2^63.
 constexpr std::uint64_t most_pixels = (1u << 17) - 1;
 
@@ -45,12 +46,20 @@ struct Piece {
 /// All of a plan, series by series. The same seeds are always cut in the same places.
 std::vector<Piece> pieces_of(const Plan& plan);
 
-/// Exact integers of some images of one series.
+/// Of the squared errors x of each pixel and seed: the sum of all x, that of all x^2, and over the pixels that of the
+/// squares of (the sum of x over the seeds).
+struct PixelSpread {
+    double sum = 0, squares = 0, squared_sums = 0;
+};
+
+/// Exact integers of some images of one series, and of the first of all how they spread between pixels.
 struct Part {
     std::uint64_t seeds = 0, pixels = 0;  ///< pixels: whose rays hit the medium
     double unit = 0;
     std::vector<clratio::MediumErrorCounts> counts;  ///< levels x 6, as clratio::MediumErrors has them
     std::vector<clratio::MediumErrorSums> sums;      ///< seeds x levels x 6
+    std::uint64_t spread_seeds = 0;                  ///< of the first piece; 0 in others
+    std::vector<PixelSpread> spreads;                ///< of these seeds, levels x 2 x 4: mean, ratio; r, g, b, all
 
     /// Adds the images of the seeds that follow.
     Part& operator+=(const Part& next);
@@ -63,6 +72,20 @@ Part compute(const clratio::MediumScene& scene, const NamedScene& named, const P
 constexpr std::size_t value_index(std::uint32_t level, bool ratio, std::size_t channel) {
     return level * std::size_t{6} + (ratio ? 3 : 0) + channel;
 }
+
+/// Index into Part::spreads.
+constexpr std::size_t spread_index(std::uint32_t level, bool ratio, std::size_t channel) {
+    return level * std::size_t{8} + (ratio ? 4 : 0) + channel;
+}
+
+/// Squared errors of at most most_error^2 each, of images of these seeds. Cost: renders each once more, at all levels.
+std::vector<PixelSpread> pixel_spreads(const clratio::MediumScene& scene, const clratio::Sampler& sampler,
+                                       clratio::IndexRange seeds, double most_error);
+
+/// The variance of the mean squared error of images of `for_seeds` seeds, were their pixels drawn anew with all their
+/// samples: variance components from images of `seeds` >= 2 seeds. With for_seeds = seeds it is the variance between the
+/// pixels' means over the seeds, divided by their number.
+double clustered_variance(const PixelSpread& spread, std::uint64_t seeds, std::uint64_t pixels, std::uint64_t for_seeds);
 
 // ---- parts on disk
 
@@ -95,6 +118,7 @@ struct Estimate {
 /// Errors of one series, level and estimator: of channel 0, 1, 2, or of all three together (3).
 struct Statistics {
     Estimate mse, rmse, bias;
+    double rmse_pixel_error = 0;         ///< one standard error of rmse, clustered by pixel; NaN for one seed or pixel
     double median = 0, median_size = 0;  ///< of the errors, and of their absolute values, within a bin's width
     double atom = 0;                     ///< the share of errors with |e| <= 1e-6
     double bright = 0;                   ///< the share of positive ones among all others
@@ -102,7 +126,6 @@ struct Statistics {
     double zero_denominators = 0;        ///< the share of values with sum t = 0
     std::uint64_t values = 0;
 };
-constexpr std::size_t all_channels = 3;
 Statistics statistics_of(const Part& part, std::uint32_t level, bool ratio, std::size_t channel);
 
 /// Density over the bins, of one channel or all: count / (all errors x width).

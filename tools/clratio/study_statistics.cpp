@@ -1,10 +1,9 @@
 #include <algorithm>
 #include <cmath>
-#include <future>
 #include <limits>
-#include <thread>
 
 #include "output_file.hpp"
+#include "parallel.hpp"
 #include "study.hpp"
 
 namespace tool::study {
@@ -75,6 +74,12 @@ double median_size_of(const clratio::MediumErrorCounts& c) {
     return median_in(cells, c.total() - c.nonfinite);
 }
 
+double pixel_error_of(const Part& part, std::size_t index, double rmse) {
+    if (part.spread_seeds < 2 || part.pixels < 2) return none;
+    if (!(rmse > 0)) return 0;
+    return std::sqrt(clustered_variance(part.spreads[index], part.spread_seeds, part.pixels, part.seeds)) / (2 * rmse);
+}
+
 double share(std::uint64_t part, std::uint64_t of) {
     return of == 0 ? none : static_cast<double>(part) / static_cast<double>(of);
 }
@@ -97,6 +102,7 @@ Statistics statistics_of(const Part& part, std::uint32_t level, bool ratio, std:
     });
     s.rmse.value = std::sqrt(s.mse.value);
     s.rmse.error = s.mse.value > 0 ? s.mse.error / (2 * s.rmse.value) : s.mse.error;
+    s.rmse_pixel_error = pixel_error_of(part, spread_index(level, ratio, channel), s.rmse.value);
     s.bias = mean_of_seeds(part.seeds, [&](std::uint64_t seed) {
         return total(seed, [&](const auto& x) { return static_cast<double>(x.sum) * part.unit; });
     });
@@ -182,13 +188,7 @@ void add(std::array<double, 4>& to, const std::array<double, 4>& from, double sc
 
 ScenePredictions predict_scene(const clratio::Scene& scene, clratio::Frame frame) {
     std::vector<RowPrediction> rows(frame.height);
-    const unsigned threads = std::max(1u, std::thread::hardware_concurrency());
-    std::vector<std::future<void>> done;
-    for (unsigned t = 0; t < threads; ++t)
-        done.push_back(std::async(std::launch::async, [&, t] {
-            for (std::uint32_t y = t; y < frame.height; y += threads) rows[y] = predict_row(scene, frame, y);
-        }));
-    for (auto& d : done) d.get();
+    in_parallel(frame.height, [&](std::size_t y) { rows[y] = predict_row(scene, frame, static_cast<std::uint32_t>(y)); });
 
     double rays = 0, partial = 0;
     for (const auto& row : rows) {
@@ -278,15 +278,16 @@ template <class Row> void for_each_row(const Results& results, std::size_t chann
 
 void write_errors_csv(const Results& results, const std::string& file) {
     OutputFile out(file);
-    out.write("scene,sampling,pattern,t,estimate,n,channel,pixels,seeds,rmse,rmse_error,bias,bias_error,median,median_size,"
+    out.write("scene,sampling,pattern,t,estimate,n,channel,pixels,seeds,rmse,rmse_error,rmse_pixel_error,bias,bias_error,"
+              "median,median_size,"
               "atom,bright,below,above,zero_denominators,predicted_rmse,predicted_bias\n");
     for_each_row(results, 4, [&](const SceneResult& scene, const Estimator& e, std::uint32_t level, std::size_t channel) {
         const Part& part = scene.part(e.sampler);
         const Statistics s = statistics_of(part, level, e.ratio, channel);
         std::string row = row_head(scene, e, level, channel) + fmt::format(",{},{}", part.pixels, part.seeds);
-        for (const double x : {s.rmse.value, s.rmse.error, s.bias.value, s.bias.error, s.median, s.median_size, s.atom,
-                               s.bright, s.below, s.above, s.zero_denominators, predicted_rmse(scene, e, level, channel),
-                               predicted_bias(scene, e, level, channel)})
+        for (const double x : {s.rmse.value, s.rmse.error, s.rmse_pixel_error, s.bias.value, s.bias.error, s.median,
+                               s.median_size, s.atom, s.bright, s.below, s.above, s.zero_denominators,
+                               predicted_rmse(scene, e, level, channel), predicted_bias(scene, e, level, channel)})
             row += "," + number(x);
         out.write(row + "\n");
     });
