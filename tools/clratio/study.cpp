@@ -71,8 +71,13 @@ std::uint64_t take_parts(const PartFolder& own, const Plan& plan, const std::vec
 /// What this run did, for people.
 struct Work {
     std::uint64_t pieces = 0, found = 0, taken = 0, computed = 0;
-    double samples = 0, seconds = 0;  ///< of the pieces computed
+    double samples = 0, seconds = 0;  ///< of the pieces computed, spreads between pixels included
+    double looks = 0;                 ///< seconds for what is not in parts
 };
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
 
 double samples_of(const Plan& plan, const Piece& piece) {
     const double images = static_cast<double>(piece.seeds.count) * plan.frame.width * plan.frame.height;
@@ -85,7 +90,7 @@ class Runner {
 public:
     Runner(const Options& options, const Plan& plan, const clratio::Engine& engine)
         : options_(options), plan_(plan), engine_(engine), shard_(shard_of(options.shard)),
-          folder_((fs::path(options.folder) / "parts").string(), plan) {
+          folder_((fs::path(options.folder) / "parts").string(), plan), times_(options.folder, engine) {
         work_.taken = take_parts(folder_, plan, options.merge);
     }
 
@@ -110,11 +115,14 @@ public:
 
     Results results() {
         Results out{plan_, {}};
+        const auto start = std::chrono::steady_clock::now();
+        const double computing = work_.seconds;
         const auto series = plan_.series();
         const auto pieces = pieces_of(plan_);
         for (std::size_t s = 0; s < plan_.scenes.size(); ++s) {
             line_.show(plan_.scenes[s].name + ": predictions ...");
-            SceneResult scene{plan_.scenes[s], {}, {}, predict_scene(plan_.scenes[s].scene, plan_.frame), {}};
+            SceneResult scene{plan_.scenes[s],  {},         {}, predict_scene(plan_.scenes[s].scene, plan_.frame), {},
+                              closer_chords(s), averages(s)};
             for (const auto& one : series)
                 if (one.scene == s) scene.series.push_back(one);
             scene.parts.resize(scene.series.size());
@@ -129,7 +137,24 @@ public:
             out.scenes.push_back(std::move(scene));
             if (interrupt_.asked()) stop();
         }
+        work_.looks = seconds_since(start) - (work_.seconds - computing);
         line_.clear();
+        return out;
+    }
+
+    std::vector<SeriesTime> times() const {
+        std::vector<SeriesTime> out;
+        for (const auto& series : plan_.series()) out.push_back({series, 0, 0, {}});
+        for (const auto& piece : pieces_of(plan_)) {
+            auto& to = *std::find_if(out.begin(), out.end(), [&](const auto& t) { return t.series == piece.series; });
+            ++to.parts;
+            const auto time = times_.find(folder_.name_of(piece));
+            if (!time) continue;
+            ++to.timed;
+            to.sum.samples += time->samples;
+            to.sum.seconds += time->seconds;
+            to.sum.spread_seconds += time->spread_seconds;
+        }
         return out;
     }
 
@@ -146,15 +171,31 @@ private:
     Part compute_one(const Piece& piece) {
         const auto& scene = on_device(piece.series.scene);
         const auto start = std::chrono::steady_clock::now();
-        const Part part = compute(scene, plan_.scenes[piece.series.scene], piece, [this](auto, auto) {
+        Part part = compute(scene, plan_.scenes[piece.series.scene], piece, [this](auto, auto) {
             if (interrupt_.asked()) stop();
             return true;
         });
-        work_.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-        work_.samples += samples_of(plan_, piece);
+        PartTime time{samples_of(plan_, piece), seconds_since(start), 0};
+        add_spreads(part, scene, piece);
+        time.spread_seconds = seconds_since(start) - time.seconds;
+        work_.seconds += time.seconds + time.spread_seconds;
+        work_.samples += time.samples;
         folder_.write(piece, part);
+        times_.add(folder_.name_of(piece), time);
         ++work_.computed;
         return part;
+    }
+
+    std::uint64_t few_seeds() const { return std::min(seeds_a_piece, plan_.seeds); }
+
+    ShortChords closer_chords(std::size_t scene) {
+        line_.show(plan_.scenes[scene].name + ": short chords ...");
+        return short_chords(on_device(scene), few_seeds());
+    }
+
+    Averages averages(std::size_t scene) {
+        line_.show(plan_.scenes[scene].name + ": averages of ratios ...");
+        return averages_of({engine_, plan_.scenes[scene].scene, averages_frame(plan_.frame)}, few_seeds());
     }
 
     void show(const Piece& piece, std::size_t missing) {
@@ -173,6 +214,7 @@ private:
     clratio::Engine engine_;
     Shard shard_;
     PartFolder folder_;
+    TimeLog times_;
     Work work_;
     ProgressLine line_;
     Interrupt interrupt_;
@@ -215,10 +257,11 @@ int study_command(const Options& options) {
         claims = claims_of(results);
         write_errors_csv(results, path_of("errors.csv"));
         write_densities_csv(results, path_of("densities.csv"));
+        write_chords_csv(results, path_of("short_chords.csv"));
+        write_averages_csv(results, path_of("averages.csv"));
         const auto& w = runner.work();
-        const double whole = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-        if (!options.no_report)
-            write_report(results, claims, engine, {options.quick, w.samples, w.seconds, whole}, path_of("report.html"));
+        const RunTimes times{options.quick, w.samples, w.seconds, seconds_since(start), w.looks, runner.times()};
+        if (!options.no_report) write_report(results, claims, engine, times, path_of("report.html"));
     }
     print_work(options, runner.work(), claims, files);
     return ok;
@@ -231,7 +274,8 @@ ratio, and compares with the exact answer. Writes into DIR
   report.html    everything, to read: scenes, error densities, convergence, claims with their verdicts
   errors.csv     root mean squared error, bias, median, shares, prediction: a line for each estimator, N and channel
   densities.csv  the histograms of the errors
-  parts/         finished parts of the work
+  short_chords.csv, averages.csv   errors where rays only touch the fog; the mean of ratios against the ratio of means
+  parts/         finished parts of the work; times.jsonl: how long each took
 
 A study that was stopped or killed goes on when the same command is given again. Several machines share the work with
 --shard; copy their folders to one place and give them to --merge, or copy the files of their parts/ into one. The CSV files

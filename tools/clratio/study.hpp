@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -65,6 +67,7 @@ struct Part {
     Part& operator+=(const Part& next);
 };
 
+/// Counts and sums; its spreads are empty.
 Part compute(const clratio::MediumScene& scene, const NamedScene& named, const Piece& piece,
              const clratio::Progress& progress = {});
 
@@ -77,6 +80,9 @@ constexpr std::size_t value_index(std::uint32_t level, bool ratio, std::size_t c
 constexpr std::size_t spread_index(std::uint32_t level, bool ratio, std::size_t channel) {
     return level * std::size_t{8} + (ratio ? 4 : 0) + channel;
 }
+
+/// Fills the spreads of a series' first part; does nothing to others.
+void add_spreads(Part& part, const clratio::MediumScene& scene, const Piece& piece);
 
 /// Squared errors of at most most_error^2 each, of images of these seeds. Cost: renders each once more, at all levels.
 std::vector<PixelSpread> pixel_spreads(const clratio::MediumScene& scene, const clratio::Sampler& sampler,
@@ -109,11 +115,38 @@ private:
     Plan plan_;
 };
 
+// ---- how long it took
+
+struct PartTime {
+    double samples = 0, seconds = 0;  ///< of the errors that were counted
+    double spread_seconds = 0;        ///< of pixel_spreads()
+};
+
+/// DIR/times.jsonl: a line for each part that was computed in this folder, with the device. Lines of other devices or widths
+/// and broken ones are left out; of several for one part the last counts.
+class TimeLog {
+public:
+    TimeLog(const std::string& folder, const clratio::Engine& engine);
+    /// Errors: IoError.
+    void add(const std::string& part, const PartTime& time);
+    std::optional<PartTime> find(const std::string& part) const;
+
+private:
+    std::string path_, device_;
+    int lanes_;
+    std::map<std::string, PartTime> times_;
+};
+
 // ---- what the integers say
 
 struct Estimate {
     double value = 0, error = 0;  ///< one standard error, from the spread of the seeds; NaN for one seed
 };
+
+/// Of one value for each seed.
+Estimate mean_of_seeds(const std::vector<double>& values);
+/// Of a mean of squares.
+Estimate root_of(const Estimate& square);
 
 /// Errors of one series, level and estimator: of channel 0, 1, 2, or of all three together (3).
 struct Statistics {
@@ -152,12 +185,49 @@ struct LitErrors {
 };
 LitErrors lit_errors(const clratio::MediumScene& scene, clratio::Sampling sampling);
 
+// ---- two closer looks, at images of seeds 0, 1, .. seeds - 1
+
+/// Root mean squares of error / tau, over channels and rays.
+struct ChordErrors {
+    clratio::Sampling sampling;
+    Estimate plain, ratio;
+};
+/// The rays whose ways through the medium are among the shortest tenth.
+struct ShortChords {
+    double longest = 0;  ///< of these ways, as a share of the longest of all
+    std::uint64_t rays = 0, seeds = 0;
+    std::uint32_t samples = 0;  ///< a pixel
+    std::vector<ChordErrors> errors;
+};
+ShortChords short_chords(const clratio::MediumScene& scene, std::uint64_t seeds);
+
+struct RmseAndBias {
+    Estimate rmse, bias;
+};
+/// tau times the ratio of the means of m and t, and tau times the mean of the ratios of single samples.
+struct Average {
+    clratio::Sampling sampling;
+    std::uint32_t level = 0;
+    RmseAndBias of_means, of_ratios;
+};
+struct Averages {
+    clratio::Frame frame;
+    std::uint64_t pixels = 0, seeds = 0;
+    std::vector<Average> lines;  ///< samplings, and in each the levels
+};
+/// Cost: renders one image for each sample.
+Averages averages_of(const clratio::MediumScene& scene, std::uint64_t seeds);
+/// The frame at most 80 x 60 pixels large, of about the same shape.
+clratio::Frame averages_frame(clratio::Frame frame);
+
 struct SceneResult {
     NamedScene named;
     std::vector<Series> series;
     std::vector<Part> parts;  ///< of the whole series, in its order
     ScenePredictions predicted;
     std::vector<LitErrors> lit;  ///< by Sampling
+    ShortChords chords;
+    Averages averages;
 
     const Part& part(const clratio::Sampler& sampler) const;
 };
@@ -180,7 +250,12 @@ std::vector<Estimator> estimators_of(const SceneResult& scene);
 double predicted_rmse(const SceneResult& scene, const Estimator& estimator, std::uint32_t level, std::size_t channel);
 double predicted_bias(const SceneResult& scene, const Estimator& estimator, std::uint32_t level, std::size_t channel);
 
+/// For CSV: nothing for NaN.
+std::string number(double x);
+
 void write_errors_csv(const Results& results, const std::string& file);
 void write_densities_csv(const Results& results, const std::string& file);
+void write_chords_csv(const Results& results, const std::string& file);
+void write_averages_csv(const Results& results, const std::string& file);
 
 }  // namespace tool::study

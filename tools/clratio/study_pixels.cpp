@@ -77,6 +77,12 @@ std::vector<PixelSpread> pixel_spreads(const clratio::MediumScene& scene, const 
     return out;
 }
 
+void add_spreads(Part& part, const clratio::MediumScene& scene, const Piece& piece) {
+    if (piece.seeds.first != 0) return;
+    part.spread_seeds = piece.seeds.count;
+    part.spreads = pixel_spreads(scene, piece.series.sampler, piece.seeds, std::ldexp(part.unit, 29));
+}
+
 double clustered_variance(const PixelSpread& x, std::uint64_t seeds, std::uint64_t pixels, std::uint64_t for_seeds) {
     const auto n = static_cast<double>(seeds), count = static_cast<double>(pixels), all = static_cast<double>(for_seeds);
     const double mean = x.sum / (n * count);

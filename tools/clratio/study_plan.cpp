@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cmath>
 
 #include "study.hpp"
 
@@ -53,10 +52,6 @@ Part compute(const clratio::MediumScene& scene, const NamedScene& named, const P
         auto& to = part.sums[i / (errors.rows.count * values) * values + i % values];
         to.sum += errors.sums[i].sum;
         to.squares += errors.sums[i].squares;
-    }
-    if (piece.seeds.first == 0) {
-        part.spread_seeds = piece.seeds.count;
-        part.spreads = pixel_spreads(scene, piece.series.sampler, piece.seeds, std::ldexp(errors.unit, 29));
     }
     return part;
 }

@@ -22,16 +22,6 @@ clratio::MediumErrorCounts counts_of(const Part& part, std::uint32_t level, bool
     return counts;
 }
 
-/// A mean over the images, with its standard error from their spread.
-template <class Value> Estimate mean_of_seeds(std::uint64_t seeds, Value value) {
-    const auto n = static_cast<double>(seeds);
-    double sum = 0, square = 0;
-    for (std::uint64_t s = 0; s < seeds; ++s) sum += value(s);
-    const double mean = sum / n;
-    for (std::uint64_t s = 0; s < seeds; ++s) square += (value(s) - mean) * (value(s) - mean);
-    return {mean, seeds > 1 ? std::sqrt(square / (n - 1) / n) : none};
-}
-
 /// A stretch of the axis and how many errors lie in it; of width 0 for those that are as good as 0.
 struct Cell {
     double lo, hi;
@@ -86,26 +76,38 @@ double share(std::uint64_t part, std::uint64_t of) {
 
 }  // namespace
 
+Estimate mean_of_seeds(const std::vector<double>& values) {
+    const auto n = static_cast<double>(values.size());
+    double sum = 0, square = 0;
+    for (const double x : values) sum += x;
+    const double mean = sum / n;
+    for (const double x : values) square += (x - mean) * (x - mean);
+    return {mean, values.size() > 1 ? std::sqrt(square / (n - 1) / n) : none};
+}
+
+Estimate root_of(const Estimate& square) {
+    const double root = std::sqrt(square.value);
+    return {root, square.value > 0 ? square.error / (2 * root) : square.error};
+}
+
 Statistics statistics_of(const Part& part, std::uint32_t level, bool ratio, std::size_t channel) {
     const auto [first, last] = channels_of(channel);
     const auto values = static_cast<double>(part.pixels * (last - first));
     const std::size_t stride = levels * std::size_t{6};
-    const auto total = [&, first = first, last = last](std::uint64_t seed, auto term) {
-        double sum = 0;
-        for (std::size_t c = first; c < last; ++c) sum += term(part.sums[seed * stride + value_index(level, ratio, c)]);
-        return sum / values;
+    const auto of_seeds = [&, first = first, last = last](auto term) {
+        std::vector<double> means(part.seeds);
+        for (std::uint64_t seed = 0; seed < part.seeds; ++seed) {
+            for (std::size_t c = first; c < last; ++c)
+                means[seed] += term(part.sums[seed * stride + value_index(level, ratio, c)]);
+            means[seed] /= values;
+        }
+        return mean_of_seeds(means);
     };
     Statistics s;
-    s.mse = mean_of_seeds(part.seeds, [&](std::uint64_t seed) {
-        return total(seed,
-                     [&](const auto& x) { return std::ldexp(static_cast<double>(x.squares), 12) * part.unit * part.unit; });
-    });
-    s.rmse.value = std::sqrt(s.mse.value);
-    s.rmse.error = s.mse.value > 0 ? s.mse.error / (2 * s.rmse.value) : s.mse.error;
+    s.mse = of_seeds([&](const auto& x) { return std::ldexp(static_cast<double>(x.squares), 12) * part.unit * part.unit; });
+    s.rmse = root_of(s.mse);
     s.rmse_pixel_error = pixel_error_of(part, spread_index(level, ratio, channel), s.rmse.value);
-    s.bias = mean_of_seeds(part.seeds, [&](std::uint64_t seed) {
-        return total(seed, [&](const auto& x) { return static_cast<double>(x.sum) * part.unit; });
-    });
+    s.bias = of_seeds([&](const auto& x) { return static_cast<double>(x.sum) * part.unit; });
     const auto counts = counts_of(part, level, ratio, channel);
     s.values = counts.total();
     s.median = median_of(counts);
@@ -255,11 +257,11 @@ LitErrors lit_errors(const clratio::MediumScene& scene, clratio::Sampling sampli
 
 // ---- CSV
 
+std::string number(double x) { return std::isnan(x) ? "" : fmt::format("{:.9g}", x); }
+
 namespace {
 
 constexpr const char* channel_names[] = {"r", "g", "b", "all"};
-
-std::string number(double x) { return std::isnan(x) ? "" : fmt::format("{:.9g}", x); }
 
 std::string row_head(const SceneResult& scene, const Estimator& e, std::uint32_t level, std::size_t channel) {
     return fmt::format("{},{},{},{},{},{},{}", scene.named.name, clratio::name_of(e.sampler.sampling),
