@@ -191,6 +191,7 @@ LitErrors lit_errors(const clratio::MediumScene& scene, clratio::Sampling sampli
 struct ChordErrors {
     clratio::Sampling sampling;
     Estimate plain, ratio;
+    double predicted = 0;  ///< of the plain mean, exact
 };
 /// The rays whose ways through the medium are among the shortest tenth.
 struct ShortChords {

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "output_file.hpp"
+#include "parallel.hpp"
 #include "study.hpp"
 
 namespace tool::study {
@@ -14,15 +15,34 @@ constexpr double tenth = 0.1;
 constexpr std::uint32_t samples = 4;
 constexpr std::array compared{Sampling::dsa, Sampling::ds, Sampling::wvds_mean, Sampling::wvds_mis};
 
+clratio::Sightline sightline(const clratio::MediumScene& scene, std::size_t pixel) {
+    const auto width = scene.frame().width;
+    const auto x = static_cast<std::uint32_t>(pixel % width), y = static_cast<std::uint32_t>(pixel / width);
+    return {scene.scene(), clratio::camera_ray(scene.scene().camera, scene.frame(), x, y)};
+}
+
 /// Lengths within the medium, pixel by pixel; 0 where a ray misses.
 std::vector<double> chord_lengths(const clratio::MediumScene& scene) {
-    std::vector<double> lengths;
-    for (std::uint32_t y = 0; y < scene.frame().height; ++y)
-        for (std::uint32_t x = 0; x < scene.frame().width; ++x) {
-            const clratio::Sightline line(scene.scene(), clratio::camera_ray(scene.scene().camera, scene.frame(), x, y));
-            lengths.push_back(line.hit() ? line.leave() - line.enter() : 0);
-        }
+    std::vector<double> lengths(scene.values() / 3);
+    in_parallel(lengths.size(), [&](std::size_t pixel) {
+        const auto line = sightline(scene, pixel);
+        lengths[pixel] = line.hit() ? line.leave() - line.enter() : 0;
+    });
     return lengths;
+}
+
+/// The plain mean's by the second moments.
+double predicted_square(const clratio::MediumScene& scene, const std::vector<std::size_t>& pixels, Sampling sampling) {
+    double sum = 0;
+    for (const std::size_t p : pixels) {
+        const auto line = sightline(scene, p);
+        const auto moments = line.second_moments(sampling);
+        for (std::size_t c = 0; c < 3; ++c) {
+            const double tau = line.tau()[c];
+            sum += clratio::predict(line.mu()[c], tau, moments.mm[c], moments.tt[c], samples).plain_mse / (tau * tau);
+        }
+    }
+    return sum / (3 * static_cast<double>(pixels.size()));
 }
 
 /// The length that a tenth of the rays that hit stay below.
@@ -58,21 +78,22 @@ ShortChords short_chords(const clratio::MediumScene& scene, std::uint64_t seeds)
         }
         for (auto* sums : {&plain, &ratio})
             for (double& sum : *sums) sum /= 3 * static_cast<double>(pixels.size());
-        out.errors.push_back({sampling, root_of(mean_of_seeds(plain)), root_of(mean_of_seeds(ratio))});
+        out.errors.push_back({sampling, root_of(mean_of_seeds(plain)), root_of(mean_of_seeds(ratio)),
+                              std::sqrt(predicted_square(scene, pixels, sampling))});
     }
     return out;
 }
 
 void write_chords_csv(const Results& results, const std::string& file) {
     OutputFile out(file);
-    out.write("scene,sampling,estimate,n,rays,seeds,relative_rmse,relative_rmse_error\n");
+    out.write("scene,sampling,estimate,n,rays,seeds,relative_rmse,relative_rmse_error,predicted\n");
     for (const auto& scene : results.scenes)
         for (const auto& e : scene.chords.errors)
             for (const bool ratio : {false, true}) {
                 const Estimate& rms = ratio ? e.ratio : e.plain;
-                out.write(fmt::format("{},{},{},{},{},{},{},{}\n", scene.named.name, clratio::name_of(e.sampling),
+                out.write(fmt::format("{},{},{},{},{},{},{},{},{}\n", scene.named.name, clratio::name_of(e.sampling),
                                       ratio ? "ratio" : "mean", scene.chords.samples, scene.chords.rays, scene.chords.seeds,
-                                      number(rms.value), number(rms.error)));
+                                      number(rms.value), number(rms.error), ratio ? "" : number(e.predicted)));
             }
     out.commit();
 }
