@@ -79,11 +79,11 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-double samples_of(const Plan& plan, const Piece& piece) {
-    const double images = static_cast<double>(piece.seeds.count) * plan.frame.width * plan.frame.height;
+/// Of the rays that meet the fog: the others need none.
+double samples_of(const Piece& piece, const Part& part) {
     const auto& sampler = piece.series.sampler;
     const double a_pixel = sampler.pattern == clratio::Pattern::iid ? 1u << (levels - 1) : (1u << levels) - 1;
-    return images * a_pixel * (sampler.independent ? 2 : 1);
+    return static_cast<double>(part.seeds * part.pixels) * a_pixel * (sampler.independent ? 2 : 1);
 }
 
 class Runner {
@@ -175,7 +175,7 @@ private:
             if (interrupt_.asked()) stop();
             return true;
         });
-        PartTime time{samples_of(plan_, piece), seconds_since(start), 0};
+        PartTime time{samples_of(piece, part), seconds_since(start), 0};
         add_spreads(part, scene, piece);
         time.spread_seconds = seconds_since(start) - time.seconds;
         work_.seconds += time.seconds + time.spread_seconds;

@@ -16,7 +16,8 @@ namespace tool::study {
 constexpr std::uint32_t levels = clratio::most_levels;  ///< N = 1, 2, 4, .. 64
 constexpr std::uint32_t bins = 256;
 constexpr std::uint64_t seeds_a_piece = 16;
-constexpr std::size_t all_channels = 3;  ///< after r, g, b
+constexpr std::uint64_t most_spread_seeds = 8;  ///< rendered twice, for pixel_spreads(): a tenth of a full study's time
+constexpr std::size_t all_channels = 3;         ///< after r, g, b
 /// 2^46 units of squared error a value at most: their sums over an image stay below 2^63.
 constexpr std::uint64_t most_pixels = (1u << 17) - 1;
 
@@ -60,7 +61,7 @@ struct Part {
     double unit = 0;
     std::vector<clratio::MediumErrorCounts> counts;  ///< levels x 6, as clratio::MediumErrors has them
     std::vector<clratio::MediumErrorSums> sums;      ///< seeds x levels x 6
-    std::uint64_t spread_seeds = 0;                  ///< of the first piece; 0 in others
+    std::uint64_t spread_seeds = 0;                  ///< the first of the first piece; 0 in others
     std::vector<PixelSpread> spreads;                ///< of these seeds, levels x 2 x 4: mean, ratio; r, g, b, all
 
     /// Adds the images of the seeds that follow.
@@ -81,7 +82,7 @@ constexpr std::size_t spread_index(std::uint32_t level, bool ratio, std::size_t 
     return level * std::size_t{8} + (ratio ? 4 : 0) + channel;
 }
 
-/// Fills the spreads of a series' first part; does nothing to others.
+/// Fills the spreads of a series' first part, from at most most_spread_seeds images; does nothing to others.
 void add_spreads(Part& part, const clratio::MediumScene& scene, const Piece& piece);
 
 /// Squared errors of at most most_error^2 each, of images of these seeds. Cost: renders each once more, at all levels.

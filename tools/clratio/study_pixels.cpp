@@ -79,8 +79,8 @@ std::vector<PixelSpread> pixel_spreads(const clratio::MediumScene& scene, const 
 
 void add_spreads(Part& part, const clratio::MediumScene& scene, const Piece& piece) {
     if (piece.seeds.first != 0) return;
-    part.spread_seeds = piece.seeds.count;
-    part.spreads = pixel_spreads(scene, piece.series.sampler, piece.seeds, std::ldexp(part.unit, 29));
+    part.spread_seeds = std::min(piece.seeds.count, most_spread_seeds);
+    part.spreads = pixel_spreads(scene, piece.series.sampler, {0, part.spread_seeds}, std::ldexp(part.unit, 29));
 }
 
 double clustered_variance(const PixelSpread& x, std::uint64_t seeds, std::uint64_t pixels, std::uint64_t for_seeds) {

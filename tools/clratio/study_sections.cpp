@@ -50,8 +50,8 @@ std::string key_of(const std::string& classes, bool line, const std::string& nam
 namespace {
 
 std::string with_error(const Estimate& e, double scale) {
-    return std::isnan(e.error) ? fmt::format("<td>{:.3g}", scale * e.value)
-                               : fmt::format("<td title=\"± {:.2g}\">{:.3g}", scale * e.error, scale * e.value);
+    return std::isnan(e.error) ? fmt::format("<td>{:#.3g}", scale * e.value)
+                               : fmt::format("<td title=\"± {:.2g}\">{:#.3g}", scale * e.error, scale * e.value);
 }
 
 std::string averages_sentence(const Results& results) {
@@ -90,7 +90,7 @@ std::string chords_section(const Results& results) {
     for (const auto& scene : results.scenes) {
         add(fmt::format("<tr><td>{}<td>{:.1f} %", escaped(scene.named.name), 100 * scene.chords.longest));
         for (const auto& e : scene.chords.errors)
-            add(fmt::format("<td class=\"pair\" title=\"± {:.2g}\">{:.3g}<small>{:.3g}</small>{}",
+            add(fmt::format("<td class=\"pair\" title=\"± {:.2g}\">{:#.3g}<small>{:#.3g}</small>{}",
                             std::isnan(e.plain.error) ? 0 : e.plain.error, e.plain.value, e.predicted,
                             with_error(e.ratio, 1)));
         add("</tr>\n");
