@@ -144,16 +144,11 @@ public:
 
     std::vector<SeriesTime> times() const {
         std::vector<SeriesTime> out;
-        for (const auto& series : plan_.series()) out.push_back({series, 0, 0, {}});
+        for (const auto& series : plan_.series()) out.push_back({series, 0, {}});
         for (const auto& piece : pieces_of(plan_)) {
             auto& to = *std::find_if(out.begin(), out.end(), [&](const auto& t) { return t.series == piece.series; });
             ++to.parts;
-            const auto time = times_.find(folder_.name_of(piece));
-            if (!time) continue;
-            ++to.timed;
-            to.sum.samples += time->samples;
-            to.sum.seconds += time->seconds;
-            to.sum.spread_seconds += time->spread_seconds;
+            if (const auto time = times_.find(folder_.name_of(piece))) to.timed.push_back(*time);
         }
         return out;
     }

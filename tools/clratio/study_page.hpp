@@ -18,7 +18,7 @@ h2{font-size:1.5rem;margin:3.6rem 0 .7rem;font-weight:600;border-top:1px solid v
 h3{font-size:1.12rem;margin:2rem 0 .4rem;font-weight:600}
 .lead{font-size:1.12rem;color:var(--soft);margin:0 0 1.6rem}
 a{color:var(--accent);text-decoration-thickness:1px;text-underline-offset:2px}
-nav{font-size:.92rem;margin:1.2rem 0 0;max-width:none}nav a{margin-right:1.1rem;white-space:nowrap}
+nav{font-size:.92rem;margin:1.2rem 0 0;display:flex;flex-wrap:wrap;gap:.2rem 1.1rem}nav a{white-space:nowrap}
 small,figcaption,.note,table,summary,.tick,.label{font-family:"Helvetica Neue",Inter,"Segoe UI",Roboto,Arial,sans-serif}
 figure{margin:1.2rem 0}figcaption,.note{font-size:.83rem;line-height:1.45;color:var(--soft);max-width:48rem}
 .shots{display:grid;grid-template-columns:repeat(4,1fr);gap:.6rem}.shots img{width:100%;display:block;border-radius:3px;background:#000}
@@ -131,8 +131,8 @@ error / τ at N = {} in the shortest tenth of the chords; {} images.</p>
 
 constexpr auto page_chords_end = R"html(</table></div>
 <p class="note">“Up to”: the longest of these chords, as a share of the scene’s longest. In grey what the second moments say of
-the plain mean, exactly. Where a number falls short of it the tail is heavy: most runs never see the rare samples that make up
-the mean square. One standard error in the tooltip. All numbers: short_chords.csv.</p>
+the plain mean, exactly. Where the two differ by much the tail is heavy: a few samples make up the mean square, and a run meets
+some of them or none. One standard error in the tooltip. All numbers: short_chords.csv.</p>
 )html";
 
 constexpr auto page_averages = R"html(<h2 id="averages">Divide last</h2>
@@ -156,9 +156,10 @@ without the ratio compared and counted on the way.</p>
 <div class="scroll"><table class="numbers"><tr><th>)html";
 
 constexpr auto page_speed_end = R"html(</table></div>
-<p class="note">Patterns are drawn anew for each N, 127 samples a pixel instead of 64. “–”: no part of it was timed. Times are
-those of the parts computed in this folder on this device, now or in an earlier run ({} of {} parts); parts from other folders
-or machines count in the errors, but not here. Standard errors clustered by pixel took {:.1f} s more, predictions, lit pixels,
+<p class="note">Rates are those of the middle part of each, so that a machine that does other work for a while does not
+blur them; seconds are sums. Rays that miss the fog are not counted. Patterns are drawn anew for each N, 127 samples a pixel
+instead of 64. “–”: no part of it was timed. Times are those of the parts computed in this folder on this device, now or in an
+earlier run ({} of {} parts); parts from other folders or machines count in the errors, but not here. Standard errors clustered by pixel took {:.1f} s more, predictions, lit pixels,
 short chords and averages {:.1f} s.</p>
 )html";
 

@@ -27,11 +27,11 @@ std::vector<Claim> claims_of(const Results& results);
 Json json_of(const Claim& claim);
 std::string text_of(const Claim& claim);
 
-/// Of the parts of one series that have a time in this folder and on this device.
+/// The parts of one series: those that have a time in this folder and on this device, of how many.
 struct SeriesTime {
     Series series;
-    std::uint64_t timed = 0, parts = 0;
-    PartTime sum;
+    std::uint64_t parts = 0;
+    std::vector<PartTime> timed;
 };
 
 struct RunTimes {

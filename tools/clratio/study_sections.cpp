@@ -49,9 +49,12 @@ std::string key_of(const std::string& classes, bool line, const std::string& nam
 
 namespace {
 
+/// Three digits.
+std::string digits(double x) { return std::abs(x) >= 100 ? fmt::format("{:.0f}", x) : fmt::format("{:#.3g}", x); }
+
 std::string with_error(const Estimate& e, double scale) {
-    return std::isnan(e.error) ? fmt::format("<td>{:#.3g}", scale * e.value)
-                               : fmt::format("<td title=\"± {:.2g}\">{:#.3g}", scale * e.error, scale * e.value);
+    return std::isnan(e.error) ? "<td>" + digits(scale * e.value)
+                               : fmt::format("<td title=\"± {:.2g}\">{}", scale * e.error, digits(scale * e.value));
 }
 
 std::string averages_sentence(const Results& results) {
@@ -77,6 +80,45 @@ std::string averages_sentence(const Results& results) {
                        kept, cases, example);
 }
 
+/// Samples, the seconds they would have taken had every part been as fast as the middle one, and those they took.
+struct Speed {
+    double samples = 0, usual = 0, seconds = 0;
+    Speed& operator+=(const Speed& o) {
+        samples += o.samples;
+        usual += o.usual;
+        seconds += o.seconds;
+        return *this;
+    }
+};
+
+Speed speed_of(const std::vector<PartTime>& parts) {
+    std::vector<double> rates;
+    Speed out;
+    for (const auto& part : parts) {
+        rates.push_back(part.samples / part.seconds);
+        out.samples += part.samples;
+        out.seconds += part.seconds;
+    }
+    if (rates.empty()) return out;
+    const auto middle = rates.begin() + static_cast<std::ptrdiff_t>(rates.size() / 2);
+    std::nth_element(rates.begin(), middle, rates.end());
+    out.usual = out.samples / *middle;
+    return out;
+}
+
+std::string speed_cells(const std::vector<Speed>& cells) {
+    std::string html;
+    Speed all;
+    const auto rate = [](const Speed& s) {
+        return s.usual > 0 ? fmt::format("<td>{:.0f}", s.samples / s.usual / 1e6) : std::string("<td>–");
+    };
+    for (const auto& cell : cells) {
+        html += rate(cell);
+        all += cell;
+    }
+    return html + rate(all) + fmt::format("<td>{:.1f}</tr>\n", all.seconds);
+}
+
 }  // namespace
 
 std::string chords_section(const Results& results) {
@@ -90,8 +132,8 @@ std::string chords_section(const Results& results) {
     for (const auto& scene : results.scenes) {
         add(fmt::format("<tr><td>{}<td>{:.1f} %", escaped(scene.named.name), 100 * scene.chords.longest));
         for (const auto& e : scene.chords.errors)
-            add(fmt::format("<td class=\"pair\" title=\"± {:.2g}\">{:#.3g}<small>{:#.3g}</small>{}",
-                            std::isnan(e.plain.error) ? 0 : e.plain.error, e.plain.value, e.predicted,
+            add(fmt::format("<td class=\"pair\" title=\"± {:.2g}\">{}<small>{}</small>{}",
+                            std::isnan(e.plain.error) ? 0 : e.plain.error, digits(e.plain.value), digits(e.predicted),
                             with_error(e.ratio, 1)));
         add("</tr>\n");
     }
@@ -134,44 +176,26 @@ std::string averages_section(const Results& results) {
 }
 
 std::string speed_section(const Results& results, const RunTimes& times, const std::string& device) {
-    std::string html;
-    const auto add = [&](const std::string& more) { html += more; };
-    const auto rate = [](const PartTime& t) {
-        return t.seconds > 0 ? fmt::format("<td>{:.0f}", t.samples / t.seconds / 1e6) : std::string("<td>–");
-    };
-    const auto plus = [](PartTime a, const PartTime& b) {
-        return PartTime{a.samples + b.samples, a.seconds + b.seconds, a.spread_seconds + b.spread_seconds};
-    };
-    add(fmt::format(page_speed, escaped(device)));
-    for (const auto& scene : results.scenes) add(fmt::format("<th>{}", escaped(scene.named.name)));
-    add("<th>all<th>seconds</tr>\n");
-    std::vector<PartTime> of_scenes(results.scenes.size());
-    PartTime whole;
+    std::string html = fmt::format(page_speed, escaped(device));
+    for (const auto& scene : results.scenes) html += fmt::format("<th>{}", escaped(scene.named.name));
+    html += "<th>all<th>seconds</tr>\n";
+    std::vector<Speed> of_scenes(results.scenes.size());
     std::uint64_t timed = 0, parts = 0;
-    const auto add_row = [&](const std::string& name, const std::vector<PartTime>& cells) {
-        PartTime all;
-        add(name);
-        for (const auto& cell : cells) {
-            add(rate(cell));
-            all = plus(all, cell);
-        }
-        add(rate(all) + fmt::format("<td>{:.1f}</tr>\n", all.seconds));
-    };
+    double spread_seconds = 0;
     for (const auto& series : results.scenes.front().series) {
-        std::vector<PartTime> row(results.scenes.size());
+        std::vector<Speed> row(results.scenes.size());
         for (const auto& t : times.series) {
             if (!(Series{0, t.series.sampler} == Series{0, series.sampler})) continue;
-            row[t.series.scene] = t.sum;
-            of_scenes[t.series.scene] = plus(of_scenes[t.series.scene], t.sum);
-            whole = plus(whole, t.sum);
-            timed += t.timed;
+            row[t.series.scene] += speed_of(t.timed);
+            of_scenes[t.series.scene] += speed_of(t.timed);
+            timed += t.timed.size();
             parts += t.parts;
+            for (const auto& part : t.timed) spread_seconds += part.spread_seconds;
         }
-        add_row("<tr><td>" + title_of(series.sampler), row);
+        html += "<tr><td>" + title_of(series.sampler) + speed_cells(row);
     }
-    add_row("<tr class=\"total\"><td>all", of_scenes);
-    add(fmt::format(page_speed_end, timed, parts, whole.spread_seconds, times.looks));
-    return html;
+    html += "<tr class=\"total\"><td>all" + speed_cells(of_scenes);
+    return html + fmt::format(page_speed_end, timed, parts, spread_seconds, times.looks);
 }
 
 }  // namespace tool::study
