@@ -71,8 +71,8 @@ std::uint64_t take_parts(const PartFolder& own, const Plan& plan, const std::vec
 /// What this run did, for people.
 struct Work {
     std::uint64_t pieces = 0, found = 0, taken = 0, computed = 0;
-    double samples = 0, seconds = 0;  ///< of the pieces computed, spreads between pixels included
-    double looks = 0;                 ///< seconds for what is not in parts
+    PartTime computed_time;
+    double looks = 0;  ///< seconds for what is not in parts
 };
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
@@ -116,7 +116,7 @@ public:
     Results results() {
         Results out{plan_, {}};
         const auto start = std::chrono::steady_clock::now();
-        const double computing = work_.seconds;
+        const PartTime before = work_.computed_time;
         const auto series = plan_.series();
         const auto pieces = pieces_of(plan_);
         for (std::size_t s = 0; s < plan_.scenes.size(); ++s) {
@@ -137,7 +137,9 @@ public:
             out.scenes.push_back(std::move(scene));
             if (interrupt_.asked()) stop();
         }
-        work_.looks = seconds_since(start) - (work_.seconds - computing);
+        const PartTime& after = work_.computed_time;
+        work_.looks =
+            seconds_since(start) - (after.seconds - before.seconds) - (after.spread_seconds - before.spread_seconds);
         line_.clear();
         return out;
     }
@@ -173,8 +175,7 @@ private:
         PartTime time{samples_of(piece, part), seconds_since(start), 0};
         add_spreads(part, scene, piece);
         time.spread_seconds = seconds_since(start) - time.seconds;
-        work_.seconds += time.seconds + time.spread_seconds;
-        work_.samples += time.samples;
+        work_.computed_time += time;
         folder_.write(piece, part);
         times_.add(folder_.name_of(piece), time);
         ++work_.computed;
@@ -218,16 +219,18 @@ private:
 };
 
 void print_work(const Options& o, const Work& w, const std::vector<Claim>& claims, const std::vector<std::string>& files) {
+    const PartTime& time = w.computed_time;
     if (o.json) {
-        Json out{{"parts", w.pieces},    {"found", w.found},     {"taken", w.taken}, {"computed", w.computed},
-                 {"samples", w.samples}, {"seconds", w.seconds}, {"files", files},   {"claims", Json::array()}};
+        Json out{{"parts", w.pieces},       {"found", w.found},        {"taken", w.taken}, {"computed", w.computed},
+                 {"samples", time.samples}, {"seconds", time.seconds}, {"files", files},   {"claims", Json::array()}};
         for (const auto& claim : claims) out["claims"].push_back(json_of(claim));
         print(out);
         return;
     }
     fmt::print("{} parts: {} found, {} of them taken from elsewhere, {} computed", w.pieces, w.found, w.taken, w.computed);
     if (w.computed > 0)
-        fmt::print(": {:.3g} samples in {:.1f} s, {:.0f} M/s", w.samples, w.seconds, w.samples / w.seconds / 1e6);
+        fmt::print(": {:.3g} samples in {:.1f} s, {:.0f} M/s", time.samples, time.seconds,
+                   time.samples / time.seconds / 1e6);
     fmt::print("\n");
     for (const auto& claim : claims) fmt::print("\n{}", text_of(claim));
     if (!files.empty()) fmt::print("\n{}\n", fmt::join(files, "\n"));
@@ -255,7 +258,7 @@ int study_command(const Options& options) {
         write_chords_csv(results, path_of("short_chords.csv"));
         write_averages_csv(results, path_of("averages.csv"));
         const auto& w = runner.work();
-        const RunTimes times{options.quick, w.samples, w.seconds, seconds_since(start), w.looks, runner.times()};
+        const RunTimes times{options.quick, w.computed_time, seconds_since(start), w.looks, runner.times()};
         if (!options.no_report) write_report(results, claims, engine, times, path_of("report.html"));
     }
     print_work(options, runner.work(), claims, files);

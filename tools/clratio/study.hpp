@@ -121,6 +121,7 @@ private:
 struct PartTime {
     double samples = 0, seconds = 0;  ///< of the errors that were counted
     double spread_seconds = 0;        ///< of pixel_spreads()
+    PartTime& operator+=(const PartTime& other);
 };
 
 /// DIR/times.jsonl: a line for each part that was computed in this folder, with the device. Lines of other devices or widths

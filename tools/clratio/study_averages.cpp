@@ -67,8 +67,10 @@ clratio::Frame averages_frame(clratio::Frame frame) {
 
 Averages averages_of(const clratio::MediumScene& scene, std::uint64_t seeds) {
     const auto tau = clratio::tau_image(scene), reference = clratio::reference_image(scene);
-    const auto values = static_cast<double>(std::count_if(tau.begin(), tau.end(), [](float x) { return x > 0; }));
-    Averages out{scene.frame(), static_cast<std::uint64_t>(values) / 3, seeds, {}};
+    std::uint64_t pixels = 0;
+    for (std::size_t i = 0; i < tau.size(); i += 3) pixels += std::max({tau[i], tau[i + 1], tau[i + 2]}) > 0;
+    const double values = 3 * static_cast<double>(std::max<std::uint64_t>(1, pixels));
+    Averages out{scene.frame(), pixels, seeds, {}};
     for (const auto sampling : compared) {
         std::vector<ImageErrors> of_seeds;
         for (std::uint64_t seed = 0; seed < seeds; ++seed)

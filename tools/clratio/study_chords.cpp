@@ -31,18 +31,20 @@ std::vector<double> chord_lengths(const clratio::MediumScene& scene) {
     return lengths;
 }
 
-/// The plain mean's by the second moments.
+/// The plain mean's by the second moments, over the channels with light.
 double predicted_square(const clratio::MediumScene& scene, const std::vector<std::size_t>& pixels, Sampling sampling) {
-    double sum = 0;
+    double sum = 0, values = 0;
     for (const std::size_t p : pixels) {
         const auto line = sightline(scene, p);
         const auto moments = line.second_moments(sampling);
         for (std::size_t c = 0; c < 3; ++c) {
             const double tau = line.tau()[c];
+            if (!(tau > 0)) continue;
             sum += clratio::predict(line.mu()[c], tau, moments.mm[c], moments.tt[c], samples).plain_mse / (tau * tau);
+            ++values;
         }
     }
-    return sum / (3 * static_cast<double>(pixels.size()));
+    return sum / values;
 }
 
 /// The length that a tenth of the rays that hit stay below.
@@ -59,25 +61,28 @@ ShortChords short_chords(const clratio::MediumScene& scene, std::uint64_t seeds)
     const auto lengths = chord_lengths(scene);
     const double most = short_length(lengths);
     ShortChords out{most / *std::max_element(lengths.begin(), lengths.end()), 0, seeds, samples, {}};
-    std::vector<std::size_t> pixels;
     const auto tau = clratio::tau_image(scene), reference = clratio::reference_image(scene);
-    for (std::size_t p = 0; p < lengths.size(); ++p)
-        if (lengths[p] > 0 && lengths[p] <= most && tau[3 * p] > 0) pixels.push_back(p);
+    std::vector<std::size_t> pixels, values;
+    for (std::size_t p = 0; p < lengths.size(); ++p) {
+        if (!(lengths[p] > 0 && lengths[p] <= most)) continue;
+        pixels.push_back(p);
+        for (std::size_t i = 3 * p; i < 3 * p + 3; ++i)
+            if (tau[i] > 0) values.push_back(i);
+    }
     out.rays = pixels.size();
     for (const auto sampling : compared) {
         std::vector<double> plain(seeds), ratio(seeds);
         for (std::uint64_t seed = 0; seed < seeds; ++seed) {
             const auto image = clratio::render(scene, {sampling}, {seed}, samples);
-            for (const std::size_t p : pixels)
-                for (std::size_t i = 3 * p; i < 3 * p + 3; ++i) {
-                    const auto exact = static_cast<double>(reference[i]), whole = static_cast<double>(tau[i]);
-                    const float lit = image.t[i] > 0 ? image.m[i] / image.t[i] : 0;
-                    plain[seed] += std::pow((static_cast<double>(image.m[i]) - exact) / whole, 2);
-                    ratio[seed] += std::pow((static_cast<double>(tau[i] * lit) - exact) / whole, 2);
-                }
+            for (const std::size_t i : values) {
+                const auto exact = static_cast<double>(reference[i]), whole = static_cast<double>(tau[i]);
+                const float lit = image.t[i] > 0 ? image.m[i] / image.t[i] : 0;
+                plain[seed] += std::pow((static_cast<double>(image.m[i]) - exact) / whole, 2);
+                ratio[seed] += std::pow((static_cast<double>(tau[i] * lit) - exact) / whole, 2);
+            }
         }
         for (auto* sums : {&plain, &ratio})
-            for (double& sum : *sums) sum /= 3 * static_cast<double>(pixels.size());
+            for (double& sum : *sums) sum /= static_cast<double>(values.size());
         out.errors.push_back({sampling, root_of(mean_of_seeds(plain)), root_of(mean_of_seeds(ratio)),
                               std::sqrt(predicted_square(scene, pixels, sampling))});
     }

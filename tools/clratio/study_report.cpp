@@ -303,9 +303,10 @@ void Page::colophon(const RunTimes& times) {
     row("system", fmt::format("{} {} on {}, {} threads", system.sysname, system.release, system.machine,
                               std::thread::hardware_concurrency()));
     row("random numbers", fmt::format("Philox4x32-10, seeds 0 to {}", plan.seeds - 1));
-    row("samples", times.seconds > 0 ? fmt::format("{:.3g} in {:.1f} s: {:.0f} million a second, errors counted on the way",
-                                                   times.samples, times.seconds, times.samples / times.seconds / 1e6)
-                                     : "all taken from earlier runs");
+    const PartTime& t = times.computed;
+    row("samples", t.seconds > 0 ? fmt::format("{:.3g} in {:.1f} s: {:.0f} million a second, errors counted on the way",
+                                               t.samples, t.seconds, t.samples / t.seconds / 1e6)
+                                 : "all taken from earlier runs");
     row("time", fmt::format("{:.0f} s up to this page, {}", times.whole, utc_now()));
     add(page_end);
 }

@@ -36,10 +36,10 @@ struct SeriesTime {
 
 struct RunTimes {
     bool quick = false;
-    double samples = 0, seconds = 0;  ///< of the parts that this run computed
-    double whole = 0;                 ///< seconds, of all up to the report
-    double looks = 0;                 ///< seconds of these: predictions, lit pixels, short chords, averages
-    std::vector<SeriesTime> series;   ///< of the plan
+    PartTime computed;               ///< of the parts that this run computed
+    double whole = 0;                ///< seconds, of all up to the report
+    double looks = 0;                ///< seconds of these: predictions, lit pixels, short chords, averages
+    std::vector<SeriesTime> series;  ///< of the plan
 };
 void write_report(const Results& results, const std::vector<Claim>& claims, const clratio::Engine& engine,
                   const RunTimes& times, const std::string& file);

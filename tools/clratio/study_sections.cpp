@@ -50,7 +50,10 @@ std::string key_of(const std::string& classes, bool line, const std::string& nam
 namespace {
 
 /// Three digits.
-std::string digits(double x) { return std::abs(x) >= 100 ? fmt::format("{:.0f}", x) : fmt::format("{:#.3g}", x); }
+std::string digits(double x) {
+    if (std::isnan(x)) return "–";
+    return std::abs(x) >= 100 ? fmt::format("{:.0f}", x) : fmt::format("{:#.3g}", x);
+}
 
 std::string with_error(const Estimate& e, double scale) {
     return std::isnan(e.error) ? "<td>" + digits(scale * e.value)

@@ -7,6 +7,13 @@
 
 namespace tool::study {
 
+PartTime& PartTime::operator+=(const PartTime& other) {
+    samples += other.samples;
+    seconds += other.seconds;
+    spread_seconds += other.spread_seconds;
+    return *this;
+}
+
 TimeLog::TimeLog(const std::string& folder, const clratio::Engine& engine)
     : path_((std::filesystem::path(folder) / "times.jsonl").string()), device_(engine.info().name), lanes_(engine.width()) {
     std::ifstream in(path_);
