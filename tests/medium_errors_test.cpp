@@ -9,6 +9,7 @@
 
 #include "clratio/medium.hpp"
 #include "medium_state.hpp"
+#include "support/medium_table.hpp"
 #include "support/scenes.hpp"
 #include "support/shapes.hpp"
 
@@ -390,56 +391,9 @@ TEST(MediumErrors, claim_3_one_ratio_sample_against_ray_marching) {
     }
 }
 
-// Root mean squared errors x 1000 at N = 1, 2, .. 64, from 16 seeds of 80 x 60 pixels of a prototype in NumPy, in double and
-// with another hash.
 TEST(MediumErrors, SlowTheWholeTable) {
-    using Row = std::array<double, 7>;
-    const Sampler march{Sampling::uni, Pattern::stratified, false}, uni{Sampling::uni}, ds{Sampling::ds}, dsa{Sampling::dsa},
-        mis{Sampling::wvds_mis}, dsm{Sampling::dsm}, spread{Sampling::uni, Pattern::iid, true},
-        apart{Sampling::wvds_mis, Pattern::iid, true};
-    struct Line {
-        std::size_t scene;
-        Sampler sampler;
-        bool ratio;
-        Row want;
-    };
-    const std::vector<Line> table{
-        {0, march, false, {120.0, 67.7, 34.4, 16.8, 8.32, 4.08, 2.07}},
-        {0, march, true, {94.0, 61.4, 32.9, 16.4, 8.22, 4.06, 2.06}},
-        {0, uni, false, {120.0, 84.8, 59.9, 42.4, 29.9, 21.2, 14.98}},
-        {0, ds, false, {96.9, 67.9, 48.0, 33.9, 24.1, 17.2, 12.2}},
-        {0, ds, true, {92.1, 64.9, 45.9, 32.5, 23.1, 16.5, 11.7}},
-        {0, dsa, false, {227, 160, 114, 80.8, 56.5, 40.0, 28.3}},
-        {0, dsa, true, {152, 112, 75.7, 48.6, 31.5, 21.1, 14.6}},
-        {0, mis, false, {94.4, 66.8, 47.5, 33.5, 23.4, 16.7, 11.8}},
-        {0, mis, true, {92.4, 65.5, 46.5, 32.8, 23.0, 16.3, 11.6}},
-        {1, march, false, {325, 193, 123, 72.8, 39.1, 19.5, 9.86}},
-        {1, march, true, {348, 197, 124, 72.8, 39.1, 19.5, 9.86}},
-        {1, ds, false, {392, 274, 195, 139, 98.6, 69.3, 49.0}},
-        {1, ds, true, {321, 242, 178, 129, 91.6, 64.6, 45.8}},
-        {1, dsa, false, {541, 376, 266, 187, 132, 94.2, 65.7}},
-        {1, dsa, true, {289, 280, 234, 169, 118, 83.4, 58.3}},
-        {1, mis, false, {339, 240, 171, 121, 84.5, 59.9, 42.8}},
-        {1, mis, true, {339, 239, 171, 121, 84.5, 59.9, 42.7}},
-        {2, march, false, {168.3, 74.0, 28.8, 11.2, 4.52, 1.90, .84}},
-        {2, march, true, {30.9, 19.7, 10.6, 5.69, 2.92, 1.46, .72}},
-        {2, ds, false, {66.5, 47.0, 33.6, 23.7, 16.8, 11.8, 8.42}},
-        {2, ds, true, {29.2, 19.6, 13.5, 9.16, 6.50, 4.52, 3.19}},
-        {2, dsa, false, {207, 147, 103, 73.2, 51.8, 36.7, 25.9}},
-        {2, dsa, true, {148, 85.4, 42.8, 21.5, 10.5, 5.96, 3.72}},
-        {2, mis, false, {39.5, 27.9, 19.8, 14.0, 9.91, 7.06, 5.00}},
-        {2, mis, true, {26.6, 19.0, 13.6, 9.56, 6.79, 4.85, 3.44}},
-        {2, spread, true, {383, 238, 147, 92.7, 61.9, 42.2, 29.4}},
-        {2, apart, true, {51.0, 35.4, 24.9, 17.5, 12.3, 8.73, 6.15}},
-        {3, march, false, {425, 269, 157, 80.6, 33.2, 13.6, 5.66}},
-        {3, march, true, {89.6, 71.9, 64.7, 46.4, 20.0, 9.51, 4.44}},
-        {3, dsm, false, {138, 97.6, 68.8, 49.1, 34.8, 24.6, 17.3}},
-        {3, dsm, true, {75.4, 54.5, 37.1, 25.8, 18.3, 13.0, 9.15}},
-        {3, mis, false, {123, 87.2, 61.8, 43.7, 30.7, 21.7, 15.2}},
-        {3, mis, true, {74.8, 54.7, 37.7, 25.8, 18.1, 12.7, 8.97}},
-    };
     std::map<std::pair<std::size_t, std::string>, Study> done;
-    for (const Line& line : table) {
+    for (const TableLine& line : medium_table()) {
         const std::string key = std::string(name_of(line.sampler.sampling)) + std::string(name_of(line.sampler.pattern)) +
                                 (line.sampler.independent ? "i" : "");
         const auto [at, fresh] = done.try_emplace({line.scene, key}, line.scene, line.sampler, 128);
@@ -447,13 +401,8 @@ TEST(MediumErrors, SlowTheWholeTable) {
             const auto got = at->second.mean(level, line.ratio, true);
             // The table's 16 seeds spread sqrt(8) times as much as these 128: 4 of both errors together, and half its last
             // digit.
-            const double rounding = line.want[level] < 1     ? .005
-                                    : line.want[level] < 10  ? .05
-                                    : line.want[level] < 100 ? .1
-                                                             : .6;
-            const double slack = 4 * 3 * got.error + 2 * line.want[level] * rounding * 1e-6;
-            EXPECT_NEAR(got.value, std::pow(1e-3 * line.want[level], 2), slack)
-                << "S" << line.scene + 1 << " " << key << (line.ratio ? " RE" : " MC") << " N=" << (1u << level);
+            const double slack = 4 * 3 * got.error + 2 * line.rmse[level] * line.half_digit[level] * 1e-6;
+            EXPECT_NEAR(got.value, std::pow(1e-3 * line.rmse[level], 2), slack) << line.name() << " N=" << (1u << level);
         }
     }
 }

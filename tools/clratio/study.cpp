@@ -71,21 +71,26 @@ std::uint64_t take_parts(const PartFolder& own, const Plan& plan, const std::vec
 /// What this run did, for people.
 struct Work {
     std::uint64_t pieces = 0, found = 0, taken = 0, computed = 0;
-    double samples = 0, seconds = 0;  ///< of the pieces computed
+    PartTime computed_time;
+    double looks = 0;  ///< seconds for what is not in parts
 };
 
-double samples_of(const Plan& plan, const Piece& piece) {
-    const double images = static_cast<double>(piece.seeds.count) * plan.frame.width * plan.frame.height;
+double seconds_since(std::chrono::steady_clock::time_point start) {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// Of the rays that meet the fog: the others need none.
+double samples_of(const Piece& piece, const Part& part) {
     const auto& sampler = piece.series.sampler;
     const double a_pixel = sampler.pattern == clratio::Pattern::iid ? 1u << (levels - 1) : (1u << levels) - 1;
-    return images * a_pixel * (sampler.independent ? 2 : 1);
+    return static_cast<double>(part.seeds * part.pixels) * a_pixel * (sampler.independent ? 2 : 1);
 }
 
 class Runner {
 public:
     Runner(const Options& options, const Plan& plan, const clratio::Engine& engine)
         : options_(options), plan_(plan), engine_(engine), shard_(shard_of(options.shard)),
-          folder_((fs::path(options.folder) / "parts").string(), plan) {
+          folder_((fs::path(options.folder) / "parts").string(), plan), times_(options.folder, engine) {
         work_.taken = take_parts(folder_, plan, options.merge);
     }
 
@@ -110,11 +115,14 @@ public:
 
     Results results() {
         Results out{plan_, {}};
+        const auto start = std::chrono::steady_clock::now();
+        const PartTime before = work_.computed_time;
         const auto series = plan_.series();
         const auto pieces = pieces_of(plan_);
         for (std::size_t s = 0; s < plan_.scenes.size(); ++s) {
             line_.show(plan_.scenes[s].name + ": predictions ...");
-            SceneResult scene{plan_.scenes[s], {}, {}, predict_scene(plan_.scenes[s].scene, plan_.frame), {}};
+            SceneResult scene{plan_.scenes[s],  {},         {}, predict_scene(plan_.scenes[s].scene, plan_.frame), {},
+                              closer_chords(s), averages(s)};
             for (const auto& one : series)
                 if (one.scene == s) scene.series.push_back(one);
             scene.parts.resize(scene.series.size());
@@ -129,7 +137,21 @@ public:
             out.scenes.push_back(std::move(scene));
             if (interrupt_.asked()) stop();
         }
+        const PartTime& after = work_.computed_time;
+        work_.looks =
+            seconds_since(start) - (after.seconds - before.seconds) - (after.spread_seconds - before.spread_seconds);
         line_.clear();
+        return out;
+    }
+
+    std::vector<SeriesTime> times() const {
+        std::vector<SeriesTime> out;
+        for (const auto& series : plan_.series()) out.push_back({series, 0, {}});
+        for (const auto& piece : pieces_of(plan_)) {
+            auto& to = *std::find_if(out.begin(), out.end(), [&](const auto& t) { return t.series == piece.series; });
+            ++to.parts;
+            if (const auto time = times_.find(folder_.name_of(piece))) to.timed.push_back(*time);
+        }
         return out;
     }
 
@@ -146,15 +168,30 @@ private:
     Part compute_one(const Piece& piece) {
         const auto& scene = on_device(piece.series.scene);
         const auto start = std::chrono::steady_clock::now();
-        const Part part = compute(scene, plan_.scenes[piece.series.scene], piece, [this](auto, auto) {
+        Part part = compute(scene, plan_.scenes[piece.series.scene], piece, [this](auto, auto) {
             if (interrupt_.asked()) stop();
             return true;
         });
-        work_.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-        work_.samples += samples_of(plan_, piece);
+        PartTime time{samples_of(piece, part), seconds_since(start), 0};
+        add_spreads(part, scene, piece);
+        time.spread_seconds = seconds_since(start) - time.seconds;
+        work_.computed_time += time;
         folder_.write(piece, part);
+        times_.add(folder_.name_of(piece), time);
         ++work_.computed;
         return part;
+    }
+
+    std::uint64_t few_seeds() const { return std::min(seeds_a_piece, plan_.seeds); }
+
+    ShortChords closer_chords(std::size_t scene) {
+        line_.show(plan_.scenes[scene].name + ": short chords ...");
+        return short_chords(on_device(scene), few_seeds());
+    }
+
+    Averages averages(std::size_t scene) {
+        line_.show(plan_.scenes[scene].name + ": averages of ratios ...");
+        return averages_of({engine_, plan_.scenes[scene].scene, averages_frame(plan_.frame)}, few_seeds());
     }
 
     void show(const Piece& piece, std::size_t missing) {
@@ -173,6 +210,7 @@ private:
     clratio::Engine engine_;
     Shard shard_;
     PartFolder folder_;
+    TimeLog times_;
     Work work_;
     ProgressLine line_;
     Interrupt interrupt_;
@@ -181,16 +219,18 @@ private:
 };
 
 void print_work(const Options& o, const Work& w, const std::vector<Claim>& claims, const std::vector<std::string>& files) {
+    const PartTime& time = w.computed_time;
     if (o.json) {
-        Json out{{"parts", w.pieces},    {"found", w.found},     {"taken", w.taken}, {"computed", w.computed},
-                 {"samples", w.samples}, {"seconds", w.seconds}, {"files", files},   {"claims", Json::array()}};
+        Json out{{"parts", w.pieces},       {"found", w.found},        {"taken", w.taken}, {"computed", w.computed},
+                 {"samples", time.samples}, {"seconds", time.seconds}, {"files", files},   {"claims", Json::array()}};
         for (const auto& claim : claims) out["claims"].push_back(json_of(claim));
         print(out);
         return;
     }
     fmt::print("{} parts: {} found, {} of them taken from elsewhere, {} computed", w.pieces, w.found, w.taken, w.computed);
     if (w.computed > 0)
-        fmt::print(": {:.3g} samples in {:.1f} s, {:.0f} M/s", w.samples, w.seconds, w.samples / w.seconds / 1e6);
+        fmt::print(": {:.3g} samples in {:.1f} s, {:.0f} M/s", time.samples, time.seconds,
+                   time.samples / time.seconds / 1e6);
     fmt::print("\n");
     for (const auto& claim : claims) fmt::print("\n{}", text_of(claim));
     if (!files.empty()) fmt::print("\n{}\n", fmt::join(files, "\n"));
@@ -215,10 +255,11 @@ int study_command(const Options& options) {
         claims = claims_of(results);
         write_errors_csv(results, path_of("errors.csv"));
         write_densities_csv(results, path_of("densities.csv"));
+        write_chords_csv(results, path_of("short_chords.csv"));
+        write_averages_csv(results, path_of("averages.csv"));
         const auto& w = runner.work();
-        const double whole = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-        if (!options.no_report)
-            write_report(results, claims, engine, {options.quick, w.samples, w.seconds, whole}, path_of("report.html"));
+        const RunTimes times{options.quick, w.computed_time, seconds_since(start), w.looks, runner.times()};
+        if (!options.no_report) write_report(results, claims, engine, times, path_of("report.html"));
     }
     print_work(options, runner.work(), claims, files);
     return ok;
@@ -231,7 +272,8 @@ ratio, and compares with the exact answer. Writes into DIR
   report.html    everything, to read: scenes, error densities, convergence, claims with their verdicts
   errors.csv     root mean squared error, bias, median, shares, prediction: a line for each estimator, N and channel
   densities.csv  the histograms of the errors
-  parts/         finished parts of the work
+  short_chords.csv, averages.csv   errors where rays only touch the fog; the mean of ratios against the ratio of means
+  parts/         finished parts of the work; times.jsonl: how long each took
 
 A study that was stopped or killed goes on when the same command is given again. Several machines share the work with
 --shard; copy their folders to one place and give them to --merge, or copy the files of their parts/ into one. The CSV files

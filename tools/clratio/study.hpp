@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +16,8 @@ namespace tool::study {
 constexpr std::uint32_t levels = clratio::most_levels;  ///< N = 1, 2, 4, .. 64
 constexpr std::uint32_t bins = 256;
 constexpr std::uint64_t seeds_a_piece = 16;
+constexpr std::uint64_t most_spread_seeds = 8;  ///< rendered twice, for pixel_spreads(): a tenth of a full study's time
+constexpr std::size_t all_channels = 3;         ///< after r, g, b
 /// 2^46 units of squared error a value at most: their sums over an image stay below 2^63.
 constexpr std::uint64_t most_pixels = (1u << 17) - 1;
 
@@ -45,17 +49,26 @@ struct Piece {
 /// All of a plan, series by series. The same seeds are always cut in the same places.
 std::vector<Piece> pieces_of(const Plan& plan);
 
-/// Exact integers of some images of one series.
+/// Of the squared errors x of each pixel and seed: the sum of all x, that of all x^2, and over the pixels that of the
+/// squares of (the sum of x over the seeds).
+struct PixelSpread {
+    double sum = 0, squares = 0, squared_sums = 0;
+};
+
+/// Exact integers of some images of one series, and of the first of all how they spread between pixels.
 struct Part {
     std::uint64_t seeds = 0, pixels = 0;  ///< pixels: whose rays hit the medium
     double unit = 0;
     std::vector<clratio::MediumErrorCounts> counts;  ///< levels x 6, as clratio::MediumErrors has them
     std::vector<clratio::MediumErrorSums> sums;      ///< seeds x levels x 6
+    std::uint64_t spread_seeds = 0;                  ///< the first of the first piece; 0 in others
+    std::vector<PixelSpread> spreads;                ///< of these seeds, levels x 2 x 4: mean, ratio; r, g, b, all
 
     /// Adds the images of the seeds that follow.
     Part& operator+=(const Part& next);
 };
 
+/// Counts and sums; its spreads are empty.
 Part compute(const clratio::MediumScene& scene, const NamedScene& named, const Piece& piece,
              const clratio::Progress& progress = {});
 
@@ -63,6 +76,23 @@ Part compute(const clratio::MediumScene& scene, const NamedScene& named, const P
 constexpr std::size_t value_index(std::uint32_t level, bool ratio, std::size_t channel) {
     return level * std::size_t{6} + (ratio ? 3 : 0) + channel;
 }
+
+/// Index into Part::spreads.
+constexpr std::size_t spread_index(std::uint32_t level, bool ratio, std::size_t channel) {
+    return level * std::size_t{8} + (ratio ? 4 : 0) + channel;
+}
+
+/// Fills the spreads of a series' first part, from at most most_spread_seeds images; does nothing to others.
+void add_spreads(Part& part, const clratio::MediumScene& scene, const Piece& piece);
+
+/// Squared errors of at most most_error^2 each, of images of these seeds. Cost: renders each once more, at all levels.
+std::vector<PixelSpread> pixel_spreads(const clratio::MediumScene& scene, const clratio::Sampler& sampler,
+                                       clratio::IndexRange seeds, double most_error);
+
+/// The variance of the mean squared error of images of `for_seeds` seeds, were their pixels drawn anew with all their
+/// samples: variance components from images of `seeds` >= 2 seeds. With for_seeds = seeds it is the variance between the
+/// pixels' means over the seeds, divided by their number.
+double clustered_variance(const PixelSpread& spread, std::uint64_t seeds, std::uint64_t pixels, std::uint64_t for_seeds);
 
 // ---- parts on disk
 
@@ -86,15 +116,44 @@ private:
     Plan plan_;
 };
 
+// ---- how long it took
+
+struct PartTime {
+    double samples = 0, seconds = 0;  ///< of the errors that were counted
+    double spread_seconds = 0;        ///< of pixel_spreads()
+    PartTime& operator+=(const PartTime& other);
+};
+
+/// DIR/times.jsonl: a line for each part that was computed in this folder, with the device. Lines of other devices or widths
+/// and broken ones are left out; of several for one part the last counts.
+class TimeLog {
+public:
+    TimeLog(const std::string& folder, const clratio::Engine& engine);
+    /// Errors: IoError.
+    void add(const std::string& part, const PartTime& time);
+    std::optional<PartTime> find(const std::string& part) const;
+
+private:
+    std::string path_, device_;
+    int lanes_;
+    std::map<std::string, PartTime> times_;
+};
+
 // ---- what the integers say
 
 struct Estimate {
     double value = 0, error = 0;  ///< one standard error, from the spread of the seeds; NaN for one seed
 };
 
+/// Of one value for each seed.
+Estimate mean_of_seeds(const std::vector<double>& values);
+/// Of a mean of squares.
+Estimate root_of(const Estimate& square);
+
 /// Errors of one series, level and estimator: of channel 0, 1, 2, or of all three together (3).
 struct Statistics {
     Estimate mse, rmse, bias;
+    double rmse_pixel_error = 0;         ///< one standard error of rmse, clustered by pixel; NaN for one seed or pixel
     double median = 0, median_size = 0;  ///< of the errors, and of their absolute values, within a bin's width
     double atom = 0;                     ///< the share of errors with |e| <= 1e-6
     double bright = 0;                   ///< the share of positive ones among all others
@@ -102,7 +161,6 @@ struct Statistics {
     double zero_denominators = 0;        ///< the share of values with sum t = 0
     std::uint64_t values = 0;
 };
-constexpr std::size_t all_channels = 3;
 Statistics statistics_of(const Part& part, std::uint32_t level, bool ratio, std::size_t channel);
 
 /// Density over the bins, of one channel or all: count / (all errors x width).
@@ -129,12 +187,50 @@ struct LitErrors {
 };
 LitErrors lit_errors(const clratio::MediumScene& scene, clratio::Sampling sampling);
 
+// ---- two closer looks, at images of seeds 0, 1, .. seeds - 1
+
+/// Root mean squares of error / tau, over channels and rays.
+struct ChordErrors {
+    clratio::Sampling sampling;
+    Estimate plain, ratio;
+    double predicted = 0;  ///< of the plain mean, exact
+};
+/// The rays whose ways through the medium are among the shortest tenth.
+struct ShortChords {
+    double longest = 0;  ///< of these ways, as a share of the longest of all
+    std::uint64_t rays = 0, seeds = 0;
+    std::uint32_t samples = 0;  ///< a pixel
+    std::vector<ChordErrors> errors;
+};
+ShortChords short_chords(const clratio::MediumScene& scene, std::uint64_t seeds);
+
+struct RmseAndBias {
+    Estimate rmse, bias;
+};
+/// tau times the ratio of the means of m and t, and tau times the mean of the ratios of single samples.
+struct Average {
+    clratio::Sampling sampling;
+    std::uint32_t level = 0;
+    RmseAndBias of_means, of_ratios;
+};
+struct Averages {
+    clratio::Frame frame;
+    std::uint64_t pixels = 0, seeds = 0;
+    std::vector<Average> lines;  ///< samplings, and in each the levels
+};
+/// Cost: renders one image for each sample.
+Averages averages_of(const clratio::MediumScene& scene, std::uint64_t seeds);
+/// The frame at most 80 x 60 pixels large, of about the same shape.
+clratio::Frame averages_frame(clratio::Frame frame);
+
 struct SceneResult {
     NamedScene named;
     std::vector<Series> series;
     std::vector<Part> parts;  ///< of the whole series, in its order
     ScenePredictions predicted;
     std::vector<LitErrors> lit;  ///< by Sampling
+    ShortChords chords;
+    Averages averages;
 
     const Part& part(const clratio::Sampler& sampler) const;
 };
@@ -157,7 +253,12 @@ std::vector<Estimator> estimators_of(const SceneResult& scene);
 double predicted_rmse(const SceneResult& scene, const Estimator& estimator, std::uint32_t level, std::size_t channel);
 double predicted_bias(const SceneResult& scene, const Estimator& estimator, std::uint32_t level, std::size_t channel);
 
+/// For CSV: nothing for NaN.
+std::string number(double x);
+
 void write_errors_csv(const Results& results, const std::string& file);
 void write_densities_csv(const Results& results, const std::string& file);
+void write_chords_csv(const Results& results, const std::string& file);
+void write_averages_csv(const Results& results, const std::string& file);
 
 }  // namespace tool::study

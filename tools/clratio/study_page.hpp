@@ -18,7 +18,7 @@ h2{font-size:1.5rem;margin:3.6rem 0 .7rem;font-weight:600;border-top:1px solid v
 h3{font-size:1.12rem;margin:2rem 0 .4rem;font-weight:600}
 .lead{font-size:1.12rem;color:var(--soft);margin:0 0 1.6rem}
 a{color:var(--accent);text-decoration-thickness:1px;text-underline-offset:2px}
-nav{font-size:.92rem;margin:1.2rem 0 0;max-width:none}nav a{margin-right:1.1rem;white-space:nowrap}
+nav{font-size:.92rem;margin:1.2rem 0 0;display:flex;flex-wrap:wrap;gap:.2rem 1.1rem}nav a{white-space:nowrap}
 small,figcaption,.note,table,summary,.tick,.label{font-family:"Helvetica Neue",Inter,"Segoe UI",Roboto,Arial,sans-serif}
 figure{margin:1.2rem 0}figcaption,.note{font-size:.83rem;line-height:1.45;color:var(--soft);max-width:48rem}
 .shots{display:grid;grid-template-columns:repeat(4,1fr);gap:.6rem}.shots img{width:100%;display:block;border-radius:3px;background:#000}
@@ -27,6 +27,8 @@ figure{margin:1.2rem 0}figcaption,.note{font-size:.83rem;line-height:1.45;color:
 .scroll{overflow-x:auto}
 table{border-collapse:collapse;font-size:.83rem;font-variant-numeric:tabular-nums}
 th{font-weight:600;text-align:left;color:var(--soft)}td,th{padding:.28rem .55rem;vertical-align:top}
+.whisker{stroke-width:1}.twofold small{display:block;color:var(--soft);font-size:.72rem;line-height:1.2}.twofold .pair{border-left:1px solid var(--rule)}
+.total td{font-weight:600;border-bottom:0}
 .numbers td,.numbers th{border-bottom:1px solid var(--rule)}.numbers td+td,.numbers th+th{text-align:right}
 .findings td{border-bottom:1px solid var(--rule)}.findings td:nth-child(3){white-space:nowrap}
 .densities{width:100%;table-layout:fixed;min-width:58rem}.densities th:first-child{width:11.5rem}
@@ -75,7 +77,8 @@ N = 1, 2, 4, .. 64 samples a pixel.{}</p>
 
 constexpr auto page_contents = R"html(</ul>
 <nav><a href="#scenes">Scenes</a><a href="#claims">Claims</a><a href="#convergence">Convergence</a><a href="#tables">Error
-densities (Tables 1–4)</a><a href="#figures">Error laws (Figures 1, 2)</a><a href="#audit">The equations</a><a
+densities (Tables 1–4)</a><a href="#chords">Short chords</a><a href="#averages">Averaged ratios</a><a
+href="#figures">Error laws (Figures 1, 2)</a><a href="#audit">The equations</a><a href="#speed">Speed</a><a
 href="#colophon">How it was made</a></nav>
 )html";
 
@@ -105,9 +108,10 @@ constexpr auto page_numbers = R"html(</div>
 )html";
 
 constexpr auto page_numbers_end =
-    R"html(<p class="note">One standard error in the tooltip, from the spread of the images, whose
-channels and pixels are summed first. Values with heavy tails (independent t, WVDS mean in a dense medium) have no stable
-RMSE: the median size of an error is given in errors.csv.</p></details>
+    R"html(<p class="note">Two standard errors in the tooltip: from the spread of the images, whose channels and pixels are
+summed first, for this grid of pixels; and with pixels as clusters, for any other grid, too. Values with heavy tails
+(independent t, WVDS mean in a dense medium) have no stable RMSE: the median size of an error is given in
+errors.csv.</p></details>
 )html";
 
 constexpr auto page_tables = R"html(<h2 id="tables">Densities of the error</h2>
@@ -117,6 +121,46 @@ the density, as its square root, so that the flanks can be seen beside the peak.
 the shape and the spread; the number below is the RMSE × 1000. Pixels whose error is 0 are left out.</p>
 <p>The lobes of the ratio are no accident: with k of N samples in shadow the estimate is about τ(1 − k/N), so the errors of one
 pixel sit on a ladder of N + 1 rungs.</p>
+)html";
+
+constexpr auto page_chords = R"html(<h2 id="chords">Where rays only touch the fog</h2>
+<p>At the corners and edges of the box a ray is in the fog for a short way only. A distance drawn on an endless ray lies behind
+it then nearly always, and the rare one that does not must carry all of the light. The table has the root mean square of
+error / τ at N = {} in the shortest tenth of the chords; {} images.</p>
+<div class="scroll"><table class="numbers twofold"><tr><th><th>up to)html";
+
+constexpr auto page_chords_end = R"html(</table></div>
+<p class="note">“Up to”: the longest of these chords, as a share of the scene’s longest. In grey what the second moments say of
+the plain mean, exactly. Where the two differ by much the tail is heavy: a few samples make up the mean square, and a run meets
+some of them or none. One standard error in the tooltip. All numbers: short_chords.csv.</p>
+)html";
+
+constexpr auto page_averages = R"html(<h2 id="averages">Divide last</h2>
+<p>Who has a picture of τ · m / t for each sample, or for each frame of an animation, may be tempted to average these. But the
+mean of ratios is another estimate than the ratio of means: each ratio keeps the bias of the few samples it was made of, however
+many are averaged. Here single samples are divided at once and averaged (<i>mean of ratios</i>), or summed and divided once
+(<i>ratio of means</i>); the same samples for both, {} images of {} × {} pixels.</p>
+<p>{}</p>
+<div class="key">)html";
+
+constexpr auto page_averages_end =
+    R"html(<p class="note">Bias × 1000 against samples a pixel; bars are one standard error. All
+numbers, with RMSE: averages.csv.</p>
+<details><summary>The numbers</summary><div class="scroll"><table class="numbers"><tr><th><th>samples<th>estimate<th>bias × 1000, N =
+1<th>N = 4<th>N = 64<th>RMSE × 1000, N = 1<th>N = 4<th>N = 64</tr>
+)html";
+
+constexpr auto page_speed = R"html(<h2 id="speed">How fast</h2>
+<p>Million samples a second on {}: rays set up, samples drawn, shadows looked up, and errors of N = 1, 2, 4, .. 64 with and
+without the ratio compared and counted on the way.</p>
+<div class="scroll"><table class="numbers"><tr><th>)html";
+
+constexpr auto page_speed_end = R"html(</table></div>
+<p class="note">Rates are those of the middle part of each, so that a machine that does other work for a while does not
+blur them; seconds are sums. Rays that miss the fog are not counted. Patterns are drawn anew for each N, 127 samples a pixel
+instead of 64. “–”: no part of it was timed. Times are those of the parts computed in this folder on this device, now or in an
+earlier run ({} of {} parts); parts from other folders or machines count in the errors, but not here. Standard errors clustered by pixel took {:.1f} s more, predictions, lit pixels,
+short chords and averages {:.1f} s.</p>
 )html";
 
 constexpr auto page_figures = R"html(<h2 id="figures">The law of the error</h2>

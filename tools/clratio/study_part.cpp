@@ -9,7 +9,7 @@
 namespace tool::study {
 namespace {
 
-constexpr auto head = "clratio study part 1, checksum ";
+constexpr auto head = "clratio study part 2, checksum ";
 
 std::string line_of(const std::string& body) {
     clratio::Checksum sum;
@@ -82,21 +82,21 @@ bool PartFolder::read(const Piece& piece, Part& part) const {
     if (all.substr(0, end + 1) != line_of(body)) return false;
     const Json json = Json::parse(body);
     if (json.at("settings") != settings_of(piece)) return false;
-    part = {piece.seeds.count, json.at("pixels"), json.at("unit"), {}, {}};
+    part = {piece.seeds.count, json.at("pixels"), json.at("unit"), {}, {}, json.at("spread_seeds"), {}};
     for (const auto& counts : json.at("counts"))
         part.counts.push_back(counts_of(counts, plan_.scenes[piece.series.scene].range));
     for (const auto& sums : json.at("sums")) part.sums.push_back({sums.at(0), sums.at(1)});
+    for (const auto& x : json.at("spreads")) part.spreads.push_back({x.at(0), x.at(1), x.at(2)});
     return true;
 }
 
 void PartFolder::write(const Piece& piece, const Part& part) const {
-    Json json{{"settings", settings_of(piece)},
-              {"pixels", part.pixels},
-              {"unit", part.unit},
-              {"counts", Json::array()},
-              {"sums", Json::array()}};
+    Json json{{"settings", settings_of(piece)}, {"pixels", part.pixels}, {"unit", part.unit},
+              {"counts", Json::array()},        {"sums", Json::array()}, {"spread_seeds", part.spread_seeds},
+              {"spreads", Json::array()}};
     for (const auto& counts : part.counts) json["counts"].push_back(counts_of(counts));
     for (const auto& sums : part.sums) json["sums"].push_back({sums.sum, sums.squares});
+    for (const auto& x : part.spreads) json["spreads"].push_back({x.sum, x.squares, x.squared_sums});
     const std::string body = json.dump() + "\n";
     OutputFile out(path_of(piece));
     out.write(line_of(body));

@@ -43,7 +43,7 @@ Part compute(const clratio::MediumScene& scene, const NamedScene& named, const P
     options.progress = progress;
     const auto errors =
         clratio::medium_errors(scene, piece.series.sampler, piece.seeds, {}, {-named.range, named.range, bins}, options);
-    Part part{piece.seeds.count, 0, errors.unit, errors.counts, {}};
+    Part part{piece.seeds.count, 0, errors.unit, errors.counts, {}, 0, {}};
     for (const auto pixels : errors.pixels) part.pixels += pixels;
     if (part.pixels == 0) throw UsageError(named.name + ": no ray of the camera meets the fog, nothing to study");
     const std::size_t values = levels * std::size_t{6};

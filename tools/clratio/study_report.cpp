@@ -12,6 +12,7 @@
 #include "output_file.hpp"
 #include "png.hpp"
 #include "study_page.hpp"
+#include "study_sections.hpp"
 #include "study_svg.hpp"
 
 namespace tool::study {
@@ -24,36 +25,6 @@ using clratio::Sampling;
 constexpr Sampler marching{Sampling::uni, Pattern::stratified, false};
 
 Sampler iid(Sampling sampling) { return {sampling, Pattern::iid, false}; }
-
-// ---- names for people
-
-const char* title_of(Sampling sampling) {
-    switch (sampling) {
-    case Sampling::uni:
-        return "Uniform";
-    case Sampling::ds:
-        return "Distance, truncated";
-    case Sampling::dsa:
-        return "Distance, untruncated";
-    case Sampling::dsm:
-        return "Distance, MIS";
-    case Sampling::wvds_mean:
-        return "WVDS, mean";
-    case Sampling::wvds_min:
-        return "WVDS, least";
-    case Sampling::wvds_mis:
-        break;
-    }
-    return "WVDS, MIS";
-}
-
-std::string title_of(const Sampler& s) {
-    if (s.sampling == Sampling::uni && s.pattern != Pattern::iid)
-        return std::string("Ray marching, ") + std::string(clratio::name_of(s.pattern));
-    if (s.independent) return std::string(title_of(s.sampling)) + ", independent t";
-    return std::string(title_of(s.sampling)) +
-           (s.pattern == Pattern::iid ? "" : ", " + std::string(clratio::name_of(s.pattern)));
-}
 
 /// The rows of Tables 1 to 4; all others stand behind a fold.
 bool in_table(const Estimator& e) {
@@ -195,12 +166,6 @@ void Page::claims(const std::vector<Claim>& claims) {
     }
 }
 
-std::string key_of(const std::string& classes, bool line, const std::string& name) {
-    return fmt::format(
-        "<span><svg viewBox=\"0 0 36 12\">{}<circle class=\"mark {}\" cx=\"18\" cy=\"6\" r=\"3.2\"/></svg>{}</span>",
-        line ? fmt::format("<path class=\"curve {}\" d=\"M0 6H36\"/>", classes) : "", classes, escaped(name));
-}
-
 void Page::convergence() {
     const std::vector<Line> lines{{{marching, false}, "c1"},
                                   {{marching, true}, "c1"},
@@ -231,9 +196,9 @@ void Page::number_table(const SceneResult& scene) {
         add(fmt::format("<tr><td>{}, {}", title_of(e.sampler), e.ratio ? "ratio" : "plain mean"));
         for (std::uint32_t level = 0; level < levels; ++level) {
             const auto s = statistics_of(scene.part(e.sampler), level, e.ratio, all_channels);
-            add(std::isnan(s.rmse.error)
-                    ? fmt::format("<td>{:.4g}", 1e3 * s.rmse.value)
-                    : fmt::format("<td title=\"± {:.2g}\">{:.4g}", 1e3 * s.rmse.error, 1e3 * s.rmse.value));
+            add(std::isnan(s.rmse.error) ? fmt::format("<td>{:.4g}", 1e3 * s.rmse.value)
+                                         : fmt::format("<td title=\"± {:.2g}, ± {:.2g} by pixels\">{:.4g}",
+                                                       1e3 * s.rmse.error, 1e3 * s.rmse_pixel_error, 1e3 * s.rmse.value));
         }
         const double predicted = predicted_rmse(scene, e, levels - 1, all_channels);
         add(std::isnan(predicted) ? std::string("<td>–") : fmt::format("<td>{:.4g}", 1e3 * predicted));
@@ -338,9 +303,10 @@ void Page::colophon(const RunTimes& times) {
     row("system", fmt::format("{} {} on {}, {} threads", system.sysname, system.release, system.machine,
                               std::thread::hardware_concurrency()));
     row("random numbers", fmt::format("Philox4x32-10, seeds 0 to {}", plan.seeds - 1));
-    row("samples", times.seconds > 0 ? fmt::format("{:.3g} in {:.1f} s: {:.0f} million a second, errors counted on the way",
-                                                   times.samples, times.seconds, times.samples / times.seconds / 1e6)
-                                     : "all taken from earlier runs");
+    const PartTime& t = times.computed;
+    row("samples", t.seconds > 0 ? fmt::format("{:.3g} in {:.1f} s: {:.0f} million a second, errors counted on the way",
+                                               t.samples, t.seconds, t.samples / t.seconds / 1e6)
+                                 : "all taken from earlier runs");
     row("time", fmt::format("{:.0f} s up to this page, {}", times.whole, utc_now()));
     add(page_end);
 }
@@ -356,8 +322,11 @@ void write_report(const Results& results, const std::vector<Claim>& claims, cons
     page.claims(claims);
     page.convergence();
     page.tables();
+    page.add(chords_section(results));
+    page.add(averages_section(results));
     page.figures(times.quick ? 1'000'000 : 10'000'000);
     page.audit();
+    page.add(speed_section(results, times, engine.info().name));
     page.colophon(times);
     page.commit();
 }

@@ -27,10 +27,19 @@ std::vector<Claim> claims_of(const Results& results);
 Json json_of(const Claim& claim);
 std::string text_of(const Claim& claim);
 
+/// The parts of one series: those that have a time in this folder and on this device, of how many.
+struct SeriesTime {
+    Series series;
+    std::uint64_t parts = 0;
+    std::vector<PartTime> timed;
+};
+
 struct RunTimes {
     bool quick = false;
-    double samples = 0, seconds = 0;  ///< of the parts that this run computed
-    double whole = 0;                 ///< seconds, of all up to the report
+    PartTime computed;               ///< of the parts that this run computed
+    double whole = 0;                ///< seconds, of all up to the report
+    double looks = 0;                ///< seconds of these: predictions, lit pixels, short chords, averages
+    std::vector<SeriesTime> series;  ///< of the plan
 };
 void write_report(const Results& results, const std::vector<Claim>& claims, const clratio::Engine& engine,
                   const RunTimes& times, const std::string& file);

@@ -1,10 +1,9 @@
 #include <algorithm>
 #include <cmath>
-#include <future>
 #include <limits>
-#include <thread>
 
 #include "output_file.hpp"
+#include "parallel.hpp"
 #include "study.hpp"
 
 namespace tool::study {
@@ -21,16 +20,6 @@ clratio::MediumErrorCounts counts_of(const Part& part, std::uint32_t level, bool
     auto counts = part.counts[value_index(level, ratio, first)];
     for (std::size_t c = first + 1; c < last; ++c) counts += part.counts[value_index(level, ratio, c)];
     return counts;
-}
-
-/// A mean over the images, with its standard error from their spread.
-template <class Value> Estimate mean_of_seeds(std::uint64_t seeds, Value value) {
-    const auto n = static_cast<double>(seeds);
-    double sum = 0, square = 0;
-    for (std::uint64_t s = 0; s < seeds; ++s) sum += value(s);
-    const double mean = sum / n;
-    for (std::uint64_t s = 0; s < seeds; ++s) square += (value(s) - mean) * (value(s) - mean);
-    return {mean, seeds > 1 ? std::sqrt(square / (n - 1) / n) : none};
 }
 
 /// A stretch of the axis and how many errors lie in it; of width 0 for those that are as good as 0.
@@ -75,31 +64,50 @@ double median_size_of(const clratio::MediumErrorCounts& c) {
     return median_in(cells, c.total() - c.nonfinite);
 }
 
+double pixel_error_of(const Part& part, std::size_t index, double rmse) {
+    if (part.spread_seeds < 2 || part.pixels < 2) return none;
+    if (!(rmse > 0)) return 0;
+    return std::sqrt(clustered_variance(part.spreads[index], part.spread_seeds, part.pixels, part.seeds)) / (2 * rmse);
+}
+
 double share(std::uint64_t part, std::uint64_t of) {
     return of == 0 ? none : static_cast<double>(part) / static_cast<double>(of);
 }
 
 }  // namespace
 
+Estimate mean_of_seeds(const std::vector<double>& values) {
+    const auto n = static_cast<double>(values.size());
+    double sum = 0, square = 0;
+    for (const double x : values) sum += x;
+    const double mean = sum / n;
+    for (const double x : values) square += (x - mean) * (x - mean);
+    return {mean, values.size() > 1 ? std::sqrt(square / (n - 1) / n) : none};
+}
+
+Estimate root_of(const Estimate& square) {
+    const double root = std::sqrt(square.value);
+    return {root, square.value > 0 ? square.error / (2 * root) : square.error};
+}
+
 Statistics statistics_of(const Part& part, std::uint32_t level, bool ratio, std::size_t channel) {
     const auto [first, last] = channels_of(channel);
     const auto values = static_cast<double>(part.pixels * (last - first));
     const std::size_t stride = levels * std::size_t{6};
-    const auto total = [&, first = first, last = last](std::uint64_t seed, auto term) {
-        double sum = 0;
-        for (std::size_t c = first; c < last; ++c) sum += term(part.sums[seed * stride + value_index(level, ratio, c)]);
-        return sum / values;
+    const auto of_seeds = [&, first = first, last = last](auto term) {
+        std::vector<double> means(part.seeds);
+        for (std::uint64_t seed = 0; seed < part.seeds; ++seed) {
+            for (std::size_t c = first; c < last; ++c)
+                means[seed] += term(part.sums[seed * stride + value_index(level, ratio, c)]);
+            means[seed] /= values;
+        }
+        return mean_of_seeds(means);
     };
     Statistics s;
-    s.mse = mean_of_seeds(part.seeds, [&](std::uint64_t seed) {
-        return total(seed,
-                     [&](const auto& x) { return std::ldexp(static_cast<double>(x.squares), 12) * part.unit * part.unit; });
-    });
-    s.rmse.value = std::sqrt(s.mse.value);
-    s.rmse.error = s.mse.value > 0 ? s.mse.error / (2 * s.rmse.value) : s.mse.error;
-    s.bias = mean_of_seeds(part.seeds, [&](std::uint64_t seed) {
-        return total(seed, [&](const auto& x) { return static_cast<double>(x.sum) * part.unit; });
-    });
+    s.mse = of_seeds([&](const auto& x) { return std::ldexp(static_cast<double>(x.squares), 12) * part.unit * part.unit; });
+    s.rmse = root_of(s.mse);
+    s.rmse_pixel_error = pixel_error_of(part, spread_index(level, ratio, channel), s.rmse.value);
+    s.bias = of_seeds([&](const auto& x) { return static_cast<double>(x.sum) * part.unit; });
     const auto counts = counts_of(part, level, ratio, channel);
     s.values = counts.total();
     s.median = median_of(counts);
@@ -182,13 +190,7 @@ void add(std::array<double, 4>& to, const std::array<double, 4>& from, double sc
 
 ScenePredictions predict_scene(const clratio::Scene& scene, clratio::Frame frame) {
     std::vector<RowPrediction> rows(frame.height);
-    const unsigned threads = std::max(1u, std::thread::hardware_concurrency());
-    std::vector<std::future<void>> done;
-    for (unsigned t = 0; t < threads; ++t)
-        done.push_back(std::async(std::launch::async, [&, t] {
-            for (std::uint32_t y = t; y < frame.height; y += threads) rows[y] = predict_row(scene, frame, y);
-        }));
-    for (auto& d : done) d.get();
+    in_parallel(frame.height, [&](std::size_t y) { rows[y] = predict_row(scene, frame, static_cast<std::uint32_t>(y)); });
 
     double rays = 0, partial = 0;
     for (const auto& row : rows) {
@@ -255,11 +257,11 @@ LitErrors lit_errors(const clratio::MediumScene& scene, clratio::Sampling sampli
 
 // ---- CSV
 
+std::string number(double x) { return std::isnan(x) ? "" : fmt::format("{:.9g}", x); }
+
 namespace {
 
 constexpr const char* channel_names[] = {"r", "g", "b", "all"};
-
-std::string number(double x) { return std::isnan(x) ? "" : fmt::format("{:.9g}", x); }
 
 std::string row_head(const SceneResult& scene, const Estimator& e, std::uint32_t level, std::size_t channel) {
     return fmt::format("{},{},{},{},{},{},{}", scene.named.name, clratio::name_of(e.sampler.sampling),
@@ -278,15 +280,16 @@ template <class Row> void for_each_row(const Results& results, std::size_t chann
 
 void write_errors_csv(const Results& results, const std::string& file) {
     OutputFile out(file);
-    out.write("scene,sampling,pattern,t,estimate,n,channel,pixels,seeds,rmse,rmse_error,bias,bias_error,median,median_size,"
+    out.write("scene,sampling,pattern,t,estimate,n,channel,pixels,seeds,rmse,rmse_error,rmse_pixel_error,bias,bias_error,"
+              "median,median_size,"
               "atom,bright,below,above,zero_denominators,predicted_rmse,predicted_bias\n");
     for_each_row(results, 4, [&](const SceneResult& scene, const Estimator& e, std::uint32_t level, std::size_t channel) {
         const Part& part = scene.part(e.sampler);
         const Statistics s = statistics_of(part, level, e.ratio, channel);
         std::string row = row_head(scene, e, level, channel) + fmt::format(",{},{}", part.pixels, part.seeds);
-        for (const double x : {s.rmse.value, s.rmse.error, s.bias.value, s.bias.error, s.median, s.median_size, s.atom,
-                               s.bright, s.below, s.above, s.zero_denominators, predicted_rmse(scene, e, level, channel),
-                               predicted_bias(scene, e, level, channel)})
+        for (const double x : {s.rmse.value, s.rmse.error, s.rmse_pixel_error, s.bias.value, s.bias.error, s.median,
+                               s.median_size, s.atom, s.bright, s.below, s.above, s.zero_denominators,
+                               predicted_rmse(scene, e, level, channel), predicted_bias(scene, e, level, channel)})
             row += "," + number(x);
         out.write(row + "\n");
     });

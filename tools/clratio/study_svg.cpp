@@ -149,6 +149,61 @@ std::string convergence_plot(const SceneResult& scene, const std::vector<Line>& 
 
 namespace {
 
+/// 1, 2 or 5 times a power of ten: about five of them in `range`.
+double tick_step(double range) {
+    const double power = std::pow(10.0, std::floor(std::log10(range / 5)));
+    const double digit = range / 5 / power;
+    return power * (digit < 1.5 ? 1 : digit < 3.5 ? 2 : digit < 7.5 ? 5 : 10);
+}
+
+std::string bias_curve(const Axes& axes, const std::vector<Average>& lines, std::size_t first, bool ratios,
+                       const std::string& classes) {
+    std::vector<std::pair<double, double>> points;
+    std::string marks;
+    for (std::uint32_t level = 0; level < levels; ++level) {
+        const Average& line = lines[first + level];
+        const Estimate& bias = ratios ? line.of_ratios.bias : line.of_means.bias;
+        const double x = level + (ratios ? -0.04 : 0.04), y = 1e3 * bias.value, error = 1e3 * bias.error;
+        points.emplace_back(x, y);
+        if (!std::isnan(error)) marks += polyline(axes, {{x, y - error}, {x, y + error}}, "whisker " + classes);
+        marks +=
+            fmt::format("<circle class=\"mark {}\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3.2\"/>", classes, axes.x(x), axes.y(y));
+    }
+    return polyline(axes, points, "curve " + classes) + marks;
+}
+
+}  // namespace
+
+std::string bias_plot(const SceneResult& scene, const std::vector<std::string>& colour_classes) {
+    double least = 0, most = 0;
+    for (const auto& line : scene.averages.lines)
+        for (const Estimate& bias : {line.of_means.bias, line.of_ratios.bias}) {
+            const double room = std::isnan(bias.error) ? 0 : bias.error;
+            least = std::min(least, 1e3 * (bias.value - room));
+            most = std::max(most, 1e3 * (bias.value + room));
+        }
+    const double margin = 0.06 * std::max(most - least, 1e-6), step = tick_step(std::max(most - least, 1e-6));
+    const Axes axes{-0.3, levels - 0.7, least - margin, most + margin, 52, 508, 12, 210};
+    std::string out =
+        fmt::format("<svg class=\"plot\" viewBox=\"0 0 520 252\"><title>{}</title>", escaped(scene.named.title));
+    for (double y = step * std::ceil(axes.y0 / step); y <= axes.y1; y += step) {
+        const double shown = std::abs(y) < step / 2 ? 0 : y;
+        out += grid(axes.left, axes.y(y), axes.right, axes.y(y));
+        out += text(axes.left - 6, axes.y(y) + 4, "tick end", fmt::format("{:g}", shown));
+    }
+    for (std::uint32_t level = 0; level < levels; ++level)
+        out += text(axes.x(level), axes.bottom + 17, "tick middle", std::to_string(1u << level));
+    out += text((axes.left + axes.right) / 2, axes.bottom + 37, "label middle", "samples a pixel, N");
+    out += fmt::format("<path class=\"guide\" d=\"M{}L{}\"/>", axes.point(axes.x0, 0), axes.point(axes.x1, 0));
+    for (std::size_t i = 0; i < colour_classes.size(); ++i) {
+        out += bias_curve(axes, scene.averages.lines, i * levels, false, colour_classes[i] + " plain");
+        out += bias_curve(axes, scene.averages.lines, i * levels, true, colour_classes[i]);
+    }
+    return out + "</svg>";
+}
+
+namespace {
+
 constexpr double panel_width = 470, panel_height = 430;
 
 std::string curve(const Axes& axes, const Curve& c, double most) {

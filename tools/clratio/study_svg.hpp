@@ -21,6 +21,9 @@ struct Line {
 /// Both axes logarithmic; marks are measured, lines the prediction where there is one.
 std::string convergence_plot(const SceneResult& scene, const std::vector<Line>& lines);
 
+/// Bias x 1000 against N of the mean of ratios (filled) and of the ratio of means (dashed), each sampling in its class.
+std::string bias_plot(const SceneResult& scene, const std::vector<std::string>& colour_classes);
+
 /// Panels side by side, as plot.hpp has them.
 std::string panels(const std::vector<Panel>& all);
 
