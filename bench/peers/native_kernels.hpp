@@ -252,9 +252,17 @@ template <class V> struct NativeKernels {
                             MediumSums& out) {
         F m[3], t[3];
         for (int c = 0; c < 3; ++c) m[c] = t[c] = V::set(0.0f);
-        for (std::uint32_t quad = 0; quad < samples / 4; ++quad) {
-            const Words w = draw(std::uint64_t{quad} << 32 | p.pixel);
-            for (const U& word : w) medium_sample(s, p, uniform(word), m, t);
+        for (std::uint32_t from = 0; from < samples; from += CLR_SUM_CHUNK) {
+            F chunk_m[3], chunk_t[3];
+            for (int c = 0; c < 3; ++c) chunk_m[c] = chunk_t[c] = V::set(0.0f);
+            for (std::uint32_t quad = from / 4; quad < std::min(samples, from + CLR_SUM_CHUNK) / 4; ++quad) {
+                const Words w = draw(std::uint64_t{quad} << 32 | p.pixel);
+                for (const U& word : w) medium_sample(s, p, uniform(word), chunk_m, chunk_t);
+            }
+            for (int c = 0; c < 3; ++c) {
+                m[c] = V::add(m[c], chunk_m[c]);
+                t[c] = V::add(t[c], chunk_t[c]);
+            }
         }
         for (int c = 0; c < 3; ++c) {
             V::store(m[c], out.m[c]);

@@ -31,7 +31,7 @@ struct MediumSums {
 std::vector<MediumPixels> medium_pixels(const clratio::device::clr_medium& scene, const std::vector<float>& occluders,
                                         std::size_t lanes);
 
-/// Sums of `samples` samples, a multiple of 4 and at most 256, of the pixels, on all cores. No light along an axis.
+/// Sums of `samples` samples, a multiple of 4, of the pixels, on all cores. No light along an axis.
 void native_medium(const NativeSet& set, const clratio::device::clr_medium& scene, const std::vector<MediumPixels>& pixels,
                    const clratio::Stream& stream, std::uint32_t samples, std::vector<MediumSums>& out);
 
