@@ -62,19 +62,17 @@ DeviceTau put(const Engine& engine, const Tau& tau, std::uint64_t count) {
 /// Host results of a blocking read-out, with the buffers that stand on them.
 class HostOutput {
 public:
-    HostOutput(const Engine& engine, std::uint64_t count, const CombineOptions& options)
-        : engine_(engine), count_(count),
+    HostOutput(const Engine& engine, std::uint64_t count, const CombineOptions& options, Combined reuse = {})
+        : engine_(engine), count_(count), result_(std::move(reuse)),
           rows_(Buffer::zeroed(engine, most_work_items(engine) * CLR_TALLY_FLAGS * sizeof(std::uint64_t))) {
-        const auto view = [&](std::vector<float>& values, bool wanted) {
-            return View{wanted ? place(values) : nullptr, 0, count};
-        };
+        const auto view = [&](std::vector<float>& values, bool wanted) { return View{place_if(wanted, values), 0, count}; };
         out_.estimate = view(result_.estimate, true);
-        if (options.flag_image) out_.flags = place(result_.flag_image);
+        out_.flags = place_if(options.flag_image, result_.flag_image);
         out_.standard_error = view(result_.standard_error, options.standard_error);
         out_.bias = view(result_.bias, options.bias);
         out_.lower = view(result_.lower, options.interval);
         out_.upper = view(result_.upper, options.interval);
-        if (options.interval) out_.kind = place(result_.kind);
+        out_.kind = place_if(options.interval, result_.kind);
         out_.gain = view(result_.gain, options.gain);
         out_.needed = view(result_.needed, options.needed);
     }
@@ -94,8 +92,9 @@ public:
     }
 
 private:
-    template <class T> cl_mem place(std::vector<T>& values) {
-        values.resize(count_);
+    template <class T> cl_mem place_if(bool wanted, std::vector<T>& values) {
+        values.resize(wanted ? count_ : 0);
+        if (!wanted) return nullptr;
         buffers_.push_back(Buffer::onto_host(engine_, std::as_writable_bytes(std::span(values))));
         return buffers_.back().mem();
     }
@@ -265,21 +264,22 @@ cl_event combine(const Moments& moments, View tau, const CombineOutput& out, Com
     return read_moments(moments, reading, wait_list).give();
 }
 
-Combined combine(const Moments& moments, const Tau& tau, CombineOptions options) {
+Combined combine(const Moments& moments, const Tau& tau, CombineOptions options, Combined reuse) {
     check_estimator(options, moments.options());
     const DeviceTau control = put(moments.engine(), tau, moments.size());
-    HostOutput out(moments.engine(), moments.size(), options);
+    HostOutput out(moments.engine(), moments.size(), options, std::move(reuse));
     wait(read_moments(moments, out.reading(control.view, options), {}));
     return out.take();
 }
 
-Combined add_and_combine(Moments& moments, std::span<const HostBatch> batches, const Tau& tau, CombineOptions options) {
+Combined add_and_combine(Moments& moments, std::span<const HostBatch> batches, const Tau& tau, CombineOptions options,
+                         Combined reuse) {
     auto& s = moments.state();
     check_estimator(options, s.options);
     if (batches.empty()) throw InvalidArgument("batches", "at least 1", "0");
     const DeviceTau control = put(s.engine, tau, s.values);
     const OnDevice in = put_on_device(s, batches);
-    HostOutput out(s.engine, s.values, options);
+    HostOutput out(s.engine, s.values, options, std::move(reuse));
     const Reading reading = out.reading(control.view, options);
     const auto all = std::span<const Batch>(in.batches);
     if (fuses(s, reading)) {

@@ -92,11 +92,13 @@ Combined combine(const Engine& engine, std::span<const float> m, std::span<const
 /// Cost: one pass over the planes read (state_bytes()) and written.
 cl_event combine(const Moments& moments, View tau, const CombineOutput& out, CombineOptions options = {},
                  std::span<const cl_event> wait_list = {});
-Combined combine(const Moments& moments, const Tau& tau, CombineOptions options = {});
+/// The memory of `reuse`, an earlier result, is taken for this one.
+Combined combine(const Moments& moments, const Tau& tau, CombineOptions options = {}, Combined reuse = {});
 
 /// Adds batches and reads out; ratio, mean and mean of ratios of a state without groups in the pass that adds the last 8
 /// batches, if nothing but estimate, error and flags is asked for. For progressive display, and where all batches are there.
-Combined add_and_combine(Moments& moments, std::span<const HostBatch> batches, const Tau& tau, CombineOptions options = {});
+Combined add_and_combine(Moments& moments, std::span<const HostBatch> batches, const Tau& tau, CombineOptions options = {},
+                         Combined reuse = {});
 /// At most 8 batches.
 cl_event add_and_combine(Moments& moments, std::span<const Batch> batches, View tau, const CombineOutput& out,
                          CombineOptions options = {}, std::span<const cl_event> wait_list = {});

@@ -13,6 +13,21 @@ Tau slice(const Tau& tau, std::uint64_t begin, std::uint64_t size) {
     return tau.numbers.empty() ? Tau(tau.image.subspan(begin, size)) : tau;
 }
 
+void reserve(Combined& to, const Combined& band, std::uint64_t values) {
+    const auto like = [values](auto& all, const auto& part) {
+        if (!part.empty()) all.reserve(values);
+    };
+    like(to.estimate, band.estimate);
+    like(to.standard_error, band.standard_error);
+    like(to.bias, band.bias);
+    like(to.lower, band.lower);
+    like(to.upper, band.upper);
+    like(to.kind, band.kind);
+    like(to.gain, band.gain);
+    like(to.needed, band.needed);
+    like(to.flag_image, band.flag_image);
+}
+
 template <class T> void append(std::vector<T>& to, const std::vector<T>& more) {
     to.insert(to.end(), more.begin(), more.end());
 }
@@ -83,32 +98,39 @@ void Bands::add(std::span<const HostBatch> batches) {
 
 template <class Read> ReadOut Bands::read(Read read_band, const Tau& tau, const Wanted& wanted) const {
     ReadOut out;
-    out.chosen.estimate.reserve(values_);
+    Combined chosen, mean;
     for (std::uint64_t band = 0; band < bands(); ++band) {
         const Tau part = slice(tau, begin(band), size(band));
-        const auto [moments, read] = read_band(band, part);
-        append(out.chosen, read);
-        if (wanted.mean) append(out.mean, clratio::combine(moments, part, plain_mean(wanted.options)));
+        const Moments& moments = read_band(band, part, chosen);
+        reserve(out.chosen, chosen, values_);
+        append(out.chosen, chosen);
+        if (wanted.mean) {
+            mean = clratio::combine(moments, part, plain_mean(wanted.options), std::move(mean));
+            reserve(out.mean, mean, values_);
+            append(out.mean, mean);
+        }
         out.negatives += moments.negatives();
     }
     return out;
 }
 
 ReadOut Bands::read_out(const Tau& tau, const Wanted& wanted) const {
-    const auto read_band = [&](std::uint64_t band, const Tau& part) {
-        return std::pair{states_[band], clratio::combine(states_[band], part, wanted.options)};
+    const auto read_band = [&](std::uint64_t band, const Tau& part, Combined& read) -> const Moments& {
+        read = clratio::combine(states_[band], part, wanted.options, std::move(read));
+        return states_[band];
     };
     return read(read_band, tau, wanted);
 }
 
 ReadOut Bands::at_once(std::span<const HostBatch> batches, const Tau& tau, const Wanted& wanted) const {
     Moments moments = make(0);
-    const auto read_band = [&](std::uint64_t band, const Tau& part) {
+    const auto read_band = [&](std::uint64_t band, const Tau& part, Combined& read) -> const Moments& {
         if (moments.size() == size(band))
             moments.clear();
         else
             moments = make(band);
-        return std::pair{moments, clratio::add_and_combine(moments, slices(band, batches), part, wanted.options)};
+        read = clratio::add_and_combine(moments, slices(band, batches), part, wanted.options, std::move(read));
+        return moments;
     };
     return read(read_band, tau, wanted);
 }
