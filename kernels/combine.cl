@@ -48,12 +48,12 @@ static inline clr_evidence clr_whole_evidence(const clr_groups* groups, uint rel
 }
 
 static inline clr_record clr_join(clr_record all, clr_record more, const clr_groups* groups, uint g, bool with_ratios) {
-    if (groups->options & CLR_STATE_PER_VALUE) return clr_record_merge(all, more, with_ratios);
+    if (groups->options & CLR_STATE_PER_VALUE) return clr_record_join(all, more, with_ratios);
     const clr_member member = groups->member[g];
     clr_entry entry;
     entry.share = clr_both(member.share_hi, member.share_lo);
     entry.spread = clr_both(member.spread_hi, member.spread_lo);
-    all.moments = clr_moments_merge(all.moments, more.moments, entry);
+    all.moments = clr_moments_join(all.moments, more.moments, entry);
     if (with_ratios) all.ratios = clr_ratios_merge(all.ratios, more.ratios, entry);
     return all;
 }
@@ -85,12 +85,12 @@ kernel void clr_combine_moments(CLR_PLANE_ARGUMENTS(s), clr_groups groups, CLR_R
         const ulong first = v * CLR_WIDTH;
         const clr_real control = clr_load_view(tau, reading.tau, first, range.count);
         clr_record all = clr_load_group(base, &groups, 0, first);
-        all.moments = clr_moments_settle(all.moments);
 #if defined(CLR_MANY_GROUPS)
         for (uint g = 1; g < groups.count; ++g) {
             all = clr_join(all, clr_load_group(base, &groups, g, first), &groups, g, clr_uses_ratios(ask.estimator));
         }
 #endif
+        all.moments = clr_moments_settle(all.moments);
         if (!skips) all.batches = whole.batches;
         const clr_quotient q = clr_divide_means(all.moments.m, all.moments.t, control, ask.zero_policy);
         const clr_evidence n = skips ? clr_evidence_of(all.batches, all.weight, all.weight2, ask.reliability) : whole;

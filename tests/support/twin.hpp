@@ -43,11 +43,11 @@ inline device::clr_estimate read_twin(std::span<const TwinValue> groups, float t
     using namespace device;
     clr_record all = groups[0].record;
     std::uint32_t offered = groups[0].offered;
-    all.moments = clr_moments_settle(all.moments);
     for (const auto& g : groups.subspan(1)) {
-        all = clr_record_merge(all, g.record, clr_uses_ratios(ask.estimator));
+        all = clr_record_join(all, g.record, clr_uses_ratios(ask.estimator));
         offered += g.offered;
     }
+    all.moments = clr_moments_settle(all.moments);
     const clr_quotient q = clr_divide_means(all.moments.m, all.moments.t, tau, ask.zero_policy);
     clr_folds folds = clr_folds_begin();
     if (clr_uses_groups(ask.estimator))

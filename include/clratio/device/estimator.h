@@ -211,20 +211,21 @@ CLR_FN clr_part clr_part_of(clr_two group, clr_two all) {
     return w;
 }
 
-CLR_FN clr_folds clr_fold(clr_folds f, clr_moments all, clr_quotient q, clr_moments group, clr_part w, clr_real tau,
-                          clr_u32 estimator) {
+// The difference of two means, to the float's precision.
+CLR_FN clr_real clr_distance(clr_two a, clr_two b) { return (a.hi - b.hi) + (a.lo - b.lo); }
+
+CLR_FN clr_folds clr_fold_regression(clr_folds f, clr_moments all, clr_moments group, clr_part w, clr_real tau) {
+    const clr_real far = clr_distance(group.t, all.t), apart = w.a * w.all * far;
+    const clr_real tt = clr_without(all.tt, group.tt, apart * far);
+    const clr_real mt = clr_without(all.mt, group.mt, apart * clr_distance(group.m, all.m));
+    f.cross = clr_fma(w.p * clr_slope_of_regression(mt, tt), clr_control_error(group.t, tau), f.cross);
+    return f;
+}
+
+CLR_FN clr_folds clr_fold_ratio(clr_folds f, clr_moments all, clr_quotient q, clr_moments group, clr_part w, clr_real tau) {
     const clr_real zero = (clr_real)(0.0f), one = (clr_real)(1.0f);
     const clr_two dm = clr_two_apart(group.m, all.m), dt = clr_two_apart(group.t, all.t);
-    const clr_real far = clr_two_nearest(dt), beyond = clr_control_error(group.t, tau);
-    f.groups += w.none ? (clr_uint)(0u) : (clr_uint)(1u);
-    if (estimator == CLR_ESTIMATOR_CROSSFIT_REGRESSION) {
-        const clr_real apart = w.a * w.all * far;
-        const clr_real tt = clr_without(all.tt, group.tt, apart * far);
-        const clr_real mt = clr_without(all.mt, group.mt, apart * clr_two_nearest(dm));
-        f.cross = clr_fma(w.p * clr_slope_of_regression(mt, tt), beyond, f.cross);
-        return f;
-    }
-    const clr_real u = clr_two_nearest(clr_two_apart(dm, clr_two_multiply(q.quotient, dt)));
+    const clr_real u = clr_two_nearest(clr_two_apart(dm, clr_two_multiply(q.quotient, dt))), far = clr_two_nearest(dt);
     const clr_residual within = clr_residual_of(group, q.quotient);
     f.residual.mm += clr_fma(w.p * w.all * u, u, within.mm);
     f.residual.mt += clr_fma(w.p * w.all * u, far, within.mt);
@@ -237,7 +238,15 @@ CLR_FN clr_folds clr_fold(clr_folds f, clr_moments all, clr_quotient q, clr_mome
     f.a += w.a;
     f.ae = clr_fma(w.a, kept, f.ae);
     f.aee = clr_fma(w.a * kept, kept, f.aee);
-    f.mickey = clr_fma(w.p * (w.a * kept), beyond, f.mickey);
+    f.mickey = clr_fma(w.p * (w.a * kept), clr_control_error(group.t, tau), f.mickey);
+    return f;
+}
+
+CLR_FN clr_folds clr_fold(clr_folds f, clr_moments all, clr_quotient q, clr_moments group, clr_part w, clr_real tau,
+                          clr_u32 estimator) {
+    f = estimator == CLR_ESTIMATOR_CROSSFIT_REGRESSION ? clr_fold_regression(f, all, group, w, tau)
+                                                       : clr_fold_ratio(f, all, q, group, w, tau);
+    f.groups += w.none ? (clr_uint)(0u) : (clr_uint)(1u);
     return f;
 }
 

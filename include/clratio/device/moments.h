@@ -66,11 +66,16 @@ CLR_FN clr_moments clr_moments_add(clr_moments s, clr_real m, clr_real t, clr_en
     return s;
 }
 
-CLR_FN clr_moments clr_moments_merge(clr_moments a, clr_moments b, clr_entry e) {
+// Chan, Golub, LeVeque 1979: b's batches as if they had been added after a's. `join` leaves loose pairs.
+CLR_FN clr_moments clr_moments_join(clr_moments a, clr_moments b, clr_entry e) {
     a.mm = clr_two_gather(a.mm, b.mm);
     a.tt = clr_two_gather(a.tt, b.tt);
     a.mt = clr_two_gather(a.mt, b.mt);
-    return clr_moments_settle(clr_moments_move(a, clr_two_apart(b.m, a.m), clr_two_apart(b.t, a.t), e));
+    return clr_moments_move(a, clr_two_apart(b.m, a.m), clr_two_apart(b.t, a.t), e);
+}
+
+CLR_FN clr_moments clr_moments_merge(clr_moments a, clr_moments b, clr_entry e) {
+    return clr_moments_settle(clr_moments_join(a, b, e));
 }
 
 CLR_FN clr_two clr_two_advance(clr_two mean, clr_two to, clr_two share) {
@@ -103,15 +108,21 @@ typedef struct {
     clr_uint batches;
 } clr_record;
 
-// b's batches as if they had been added after a's. Chan, Golub, LeVeque 1979.
-CLR_FN clr_record clr_record_merge(clr_record a, clr_record b, bool with_ratios) {
+// The same for all that a state knows.
+CLR_FN clr_record clr_record_join(clr_record a, clr_record b, bool with_ratios) {
     const clr_two sum = clr_two_add(a.weight, b.weight);
     const clr_entry e = clr_entry_make(a.weight, b.weight, sum);
-    a.moments = clr_moments_merge(a.moments, b.moments, e);
+    a.moments = clr_moments_join(a.moments, b.moments, e);
     if (with_ratios) a.ratios = clr_ratios_merge(a.ratios, b.ratios, e);
     a.weight = sum;
     a.weight2 = clr_two_add(a.weight2, b.weight2);
     a.batches += b.batches;
+    return a;
+}
+
+CLR_FN clr_record clr_record_merge(clr_record a, clr_record b, bool with_ratios) {
+    a = clr_record_join(a, b, with_ratios);
+    a.moments = clr_moments_settle(a.moments);
     return a;
 }
 
