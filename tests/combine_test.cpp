@@ -163,6 +163,18 @@ TEST(Combine, equal_means_give_tau_exactly_and_no_error) {
     EXPECT_EQ(out.standard_error, std::vector<float>(values, 0.0f));
 }
 
+TEST(Combine, the_smallest_means_have_their_ratio) {
+    const Engine engine;
+    cl_device_fp_config config = 0;
+    clGetDeviceInfo(engine.device(), CL_DEVICE_SINGLE_FP_CONFIG, sizeof config, &config, nullptr);
+    if (!(config & CL_FP_DENORM)) GTEST_SKIP() << "this device takes subnormal numbers for 0";
+    Moments s(engine, 4);
+    const std::vector<float> t{0x1p-130f, 0x1p-126f, 0x1p-100f, 0x1p-149f}, m{0x1p-131f, 0x1p-127f, 0x1p-101f, 0x1p-149f};
+    s.add(m, t);
+    const auto estimate = combine(s, 3.0f).estimate;
+    EXPECT_EQ(estimate, (std::vector<float>{1.5f, 1.5f, 1.5f, 3.0f}));
+}
+
 TEST(Combine, m_between_0_and_t_stays_between_0_and_tau) {
     const Engine engine;
     for (std::uint64_t seed : {1, 2, 3}) {
