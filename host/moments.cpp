@@ -152,13 +152,14 @@ struct Rectangle {
 
 }  // namespace
 
-void Moments::State::read_plane(const PlanePart& part, std::span<std::uint32_t> words) const {
+std::vector<std::uint32_t> Moments::State::read_plane(const PlanePart& part) const {
     const Rectangle r(part, values, groups.size());
-    std::vector<std::uint32_t> tiles(plane_stride(values));
+    std::vector<std::uint32_t> words(plane_stride(values));
     check(clEnqueueReadBufferRect(engine.queue(), part.plane, CL_TRUE, r.origin.data(), r.host_origin.data(),
-                                  r.region.data(), r.pitch, 0, r.row, 0, tiles.data(), 0, nullptr, nullptr),
+                                  r.region.data(), r.pitch, 0, r.row, 0, words.data(), 0, nullptr, nullptr),
           "clEnqueueReadBufferRect");
-    std::copy_n(tiles.begin(), values, words.begin());
+    words.resize(values);
+    return words;
 }
 
 void Moments::State::write_plane(const PlanePart& part, std::span<const std::uint32_t> words) const {
@@ -344,7 +345,8 @@ std::vector<std::uint32_t> Moments::bits(cl_mem StatePlanes::*plane) const {
     std::vector<std::uint32_t> out(parts * s.groups.size() * s.values);
     wait(s.last);
     for (std::size_t p = 0; p < parts * s.groups.size(); ++p)
-        if (s.groups[p / parts].batches != 0) s.read_plane({mem, parts, p}, std::span(out).subspan(p * s.values, s.values));
+        if (s.groups[p / parts].batches != 0)
+            std::ranges::copy(s.read_plane({mem, parts, p}), out.begin() + static_cast<std::ptrdiff_t>(p * s.values));
     return out;
 }
 

@@ -35,7 +35,7 @@ struct Moments::State {
     std::uint64_t batches() const;
     device::clr_state state_of(std::size_t group) const;
     device::clr_groups all_groups() const;
-    void read_plane(const PlanePart& part, std::span<std::uint32_t> words) const;  ///< blocking
+    std::vector<std::uint32_t> read_plane(const PlanePart& part) const;  ///< blocking
     void write_plane(const PlanePart& part, std::span<const std::uint32_t> words) const;
     Launch& give_planes(Launch& launch) const;  ///< the CLR_PLANE_ARGUMENTS
 };

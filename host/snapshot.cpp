@@ -193,8 +193,8 @@ Snapshot Moments::snapshot() const {
     Snapshot out{"moments", s.values, settings_of(s.options), {}, negatives(), skipped(), {}};
     for (const auto& g : s.groups) out.groups.push_back({g.batches, g.weight.hi, g.weight.lo, g.weight2.hi, g.weight2.lo});
     for_planes(s, [&](std::size_t group, const std::string& name, const PlanePart& part) {
-        auto& words = out.planes.emplace_back(Snapshot::Plane{name, std::vector<std::uint32_t>(s.values)}).words;
-        if (s.groups[group].batches != 0) s.read_plane(part, words);  // else the plane holds anything
+        const bool empty = s.groups[group].batches == 0;  // then its planes hold anything
+        out.planes.push_back({name, empty ? std::vector<std::uint32_t>(s.values) : s.read_plane(part)});
     });
     return out;
 }

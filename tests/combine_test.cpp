@@ -193,6 +193,36 @@ TEST(Combine, m_between_0_and_t_stays_between_0_and_tau) {
     }
 }
 
+// Whole vectors that begin on a multiple of 64 bytes go past the caches; one element further none does.
+TEST(Combine, large_results_past_the_caches_have_the_bits_of_others) {
+    constexpr std::uint64_t count = (1u << 20) + 37;
+    const Engine engine;
+    const Pair p = make_pair_of(2, count), other = make_pair_of(3, count);
+    Moments s(engine, count);
+    s.add(p.m, p.t);
+    s.add(other.m, other.t);
+    const Buffer tau = Buffer::from_host(engine, std::as_bytes(std::span(p.tau)));
+    const auto read_out = [&](std::uint64_t offset) {
+        std::vector<float> both;
+        std::vector<float> untouched(count + 1, -7.0f);
+        const Buffer value = Buffer::copy_of(engine, std::as_bytes(std::span(untouched))),
+                     error = Buffer::copy_of(engine, std::as_bytes(std::span(untouched)));
+        wait(
+            Event(combine(s, {tau.mem(), 0, count}, {{value.mem(), offset, count}, {error.mem(), offset, count}, nullptr})));
+        for (const Buffer& from : {value, error}) {
+            std::vector<float> got(count + 1);
+            from.read(std::as_writable_bytes(std::span(got)));
+            EXPECT_EQ(got[offset == 0 ? count : 0], -7.0f);
+            both.insert(both.end(), got.begin() + static_cast<std::ptrdiff_t>(offset),
+                        got.begin() + static_cast<std::ptrdiff_t>(offset + count));
+        }
+        return bits(both);
+    };
+    const auto past = read_out(0), into = read_out(1);
+    EXPECT_TRUE(past == into);
+    EXPECT_FALSE(read_out(0) == bits(std::vector<float>(2 * count, -7.0f))) << "the planted fault: nothing was written";
+}
+
 TEST(Combine, zero_tau_takes_the_impulse_guard) {
     const Engine engine;
     const std::vector<float> m{3, 0, 3}, t{2, 0, -1}, tau{0, 0, 0};

@@ -1,7 +1,7 @@
 // One vocabulary for OpenCL C 1.2 and C++: the only file that asks which compiler reads it.
 // OpenCL C: types of CLR_WIDTH lanes (1, 2, 4, 8, 16). C++: one lane, inside clratio::device.
 // With a clang behind OpenCL C, 32 lanes are two vectors of 16 in step, floats only: where one long chain of operations
-// waits for itself, two of them fill the pipes (measured with AVX-512: reading out of the cache takes 0.4 of the time).
+// waits for itself, two of them fill the pipes (measured with AVX-512, in cache, over 8 groups: half the time).
 // clr_pairs: 64-bit lanes that hold the even, or the odd, 32-bit lanes in their low halves and anything in their high
 // halves. Below width 8 (where PoCL would take such short vectors apart) the even ones are all lanes, and the odd ones none.
 #ifndef CLRATIO_DEVICE_PORTABLE_H

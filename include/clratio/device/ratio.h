@@ -45,28 +45,23 @@ typedef struct {
     clr_mask empty;                        // t + i is 0
 } clr_quotient;
 
-// t + i, 1 where that is 0.
-CLR_FN clr_two clr_denominator_of(clr_two t, clr_real impulse) {
-    const clr_two sum = clr_two_sum(t.hi, impulse);
-    const clr_mask empty = sum.hi == (clr_real)(0.0f);
-    return clr_two_make(empty ? (clr_real)(1.0f) : sum.hi, sum.lo + t.lo);
-}
-
 CLR_FN clr_quotient clr_divide_means(clr_two m, clr_two t, clr_real tau, clr_u32 zero_policy) {
     const clr_real zero = (clr_real)(0.0f), one = (clr_real)(1.0f), impulse = clr_impulse(tau);
-    const clr_two denominator = clr_denominator_of(t, impulse);
+    const clr_two sum = clr_two_sum(t.hi, impulse);
+    const clr_mask empty = sum.hi == zero;
+    const clr_two denominator = clr_two_make(empty ? one : sum.hi, sum.lo + t.lo);
     const clr_real scale = clr_abs(denominator.hi) < (clr_real)(0x1p-100f) ? (clr_real)(0x1p100f) : one;
     const clr_real inverse = one / (denominator.hi * scale);
     clr_quotient q;
-    q.empty = t.hi + impulse == zero;
+    q.empty = empty;
     const clr_real first = m.hi / denominator.hi;
     const clr_real rest = clr_fma(-first, denominator.hi, m.hi) + clr_fma(-first, denominator.lo, m.lo);
-    q.quotient = clr_two_make(q.empty ? zero : first, q.empty ? zero : (rest * scale) * inverse);
+    q.quotient = clr_two_make(empty ? zero : first, empty ? zero : (rest * scale) * inverse);
     q.control = tau + impulse;
     q.denominator = denominator.hi;
     q.inverse = inverse * scale;
     const clr_two product = clr_two_product(q.control, q.quotient.hi);
-    q.value = q.empty ? clr_zero_value(zero_policy, tau, m.hi) : product.hi + clr_fma(q.control, q.quotient.lo, product.lo);
+    q.value = empty ? clr_zero_value(zero_policy, tau, m.hi) : product.hi + clr_fma(q.control, q.quotient.lo, product.lo);
     return q;
 }
 
