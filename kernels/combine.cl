@@ -25,17 +25,17 @@ kernel void clr_combine(global const float* m, clr_layout m_layout, global const
     clr_store_flag_tally(&tally, flag_rows);
 }
 
-static inline clr_state clr_state_of(const clr_groups* groups, uint g) {
+CLR_FN clr_state clr_state_of(const clr_groups* groups, uint g) {
     const clr_state s = {g, groups->count, groups->of[g], groups->options};
     return s;
 }
 
-static inline clr_record clr_load_group(clr_planes base, const clr_groups* groups, uint g, ulong i) {
+CLR_FN clr_record clr_load_group(clr_planes base, const clr_groups* groups, uint g, ulong i) {
     return clr_load_record(base, clr_state_of(groups, g), i);
 }
 
 // What the batches of all groups are worth together, where no value has skipped any.
-static inline clr_evidence clr_whole_evidence(const clr_groups* groups, uint reliability) {
+CLR_FN clr_evidence clr_whole_evidence(const clr_groups* groups, uint reliability) {
     clr_group sum = groups->of[0];
     clr_two weight = clr_both(sum.weight_hi, sum.weight_lo), weight2 = clr_both(sum.weight2_hi, sum.weight2_lo);
     for (uint g = 1; g < groups->count; ++g) {
@@ -47,7 +47,7 @@ static inline clr_evidence clr_whole_evidence(const clr_groups* groups, uint rel
     return clr_evidence_of((clr_uint)(sum.batches), weight, weight2, reliability);
 }
 
-static inline clr_record clr_join(clr_record all, clr_record more, const clr_groups* groups, uint g, bool with_ratios) {
+CLR_FN clr_record clr_join(clr_record all, clr_record more, const clr_groups* groups, uint g, bool with_ratios) {
     if (groups->options & CLR_STATE_PER_VALUE) return clr_record_join(all, more, with_ratios);
     const clr_member member = groups->member[g];
     clr_entry entry;
@@ -58,7 +58,7 @@ static inline clr_record clr_join(clr_record all, clr_record more, const clr_gro
     return all;
 }
 
-static inline clr_part clr_part_in(const clr_groups* groups, uint g, clr_record group, clr_record all, clr_evidence whole) {
+CLR_FN clr_part clr_part_in(const clr_groups* groups, uint g, clr_record group, clr_record all, clr_evidence whole) {
     if (groups->options & CLR_STATE_PER_VALUE) return clr_part_of(group.weight, all.weight);
     clr_part w;
     w.p = (clr_real)(groups->member[g].p);

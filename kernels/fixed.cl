@@ -18,19 +18,19 @@ typedef struct {
 #define CLR_FIXED_PLANES(s)                                                                                                 \
     { s##_m, s##_t, s##_mm, s##_tt, s##_mt, s##_weight, s##_batches }
 
-static inline clr_uint clr_one_where(clr_mask m) { return m ? (clr_uint)(1u) : (clr_uint)(0u); }
+CLR_FN clr_uint clr_one_where(clr_mask m) { return m ? (clr_uint)(1u) : (clr_uint)(0u); }
 
-static inline clr_limbs clr_load_limbs(global const ulong* p, ulong stride, ulong i) {
+CLR_FN clr_limbs clr_load_limbs(global const ulong* p, ulong stride, ulong i) {
     return clr_limbs_make(clr_load(p + i), clr_load(p + stride + i));
 }
 
-static inline void clr_store_limbs(clr_limbs v, global ulong* p, ulong stride, ulong i) {
+CLR_FN void clr_store_limbs(clr_limbs v, global ulong* p, ulong stride, ulong i) {
     clr_store(v.lo, p + i);
     clr_store(v.hi, p + stride + i);
 }
 
 // A state without batches is zero, whatever its planes hold: they are never cleared.
-static inline clr_fixed clr_load_fixed(clr_fixed_planes p, clr_fixed_state s, ulong i) {
+CLR_FN clr_fixed clr_load_fixed(clr_fixed_planes p, clr_fixed_state s, ulong i) {
     clr_fixed r;
     if (s.batches == 0) {
         const clr_wide zero = (clr_wide)(0UL);
@@ -53,7 +53,7 @@ static inline clr_fixed clr_load_fixed(clr_fixed_planes p, clr_fixed_state s, ul
     return r;
 }
 
-static inline void clr_store_fixed(clr_fixed v, clr_fixed_planes p, clr_fixed_state s, ulong i) {
+CLR_FN void clr_store_fixed(clr_fixed v, clr_fixed_planes p, clr_fixed_state s, ulong i) {
     clr_store(v.m, p.m + i);
     clr_store(v.t, p.t + i);
     clr_store_limbs(v.mm, p.mm, s.stride, i);
@@ -68,13 +68,13 @@ typedef struct {
     clr_uint negative, skipped, outside;
 } clr_fixed_tally;
 
-static inline clr_fixed_tally clr_fixed_tally_zero(void) {
+CLR_FN clr_fixed_tally clr_fixed_tally_zero(void) {
     clr_fixed_tally r;
     r.negative = r.skipped = r.outside = (clr_uint)(0u);
     return r;
 }
 
-static inline void clr_fixed_count(clr_fixed_tally* tally, clr_real m, clr_real t, clr_real limit) {
+CLR_FN void clr_fixed_count(clr_fixed_tally* tally, clr_real m, clr_real t, clr_real limit) {
     const clr_real zero = (clr_real)(0.0f);
     tally->negative += clr_one_where(m < zero) + clr_one_where(t < zero);
     const clr_uint refused = clr_one_where(!clr_fixed_takes(m, t, limit));
@@ -82,7 +82,7 @@ static inline void clr_fixed_count(clr_fixed_tally* tally, clr_real m, clr_real 
     tally->outside += refused & clr_one_where(clr_is_finite(m) && clr_is_finite(t));
 }
 
-static inline void clr_fixed_tell(const clr_fixed_tally* tally, global ulong* rows) {
+CLR_FN void clr_fixed_tell(const clr_fixed_tally* tally, global ulong* rows) {
     rows += get_global_id(0) * CLR_FIXED_TALLY;
     rows[CLR_FIXED_TALLY_NEGATIVE] += clr_sum_lanes(tally->negative);
     rows[CLR_FIXED_TALLY_SKIPPED] += clr_sum_lanes(tally->skipped);

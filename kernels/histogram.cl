@@ -13,7 +13,7 @@
 #define CLR_COUNTERS global
 #endif
 
-static inline void clr_count_one(CLR_COUNTERS uint* counters, uint slot) {
+CLR_FN void clr_count_one(CLR_COUNTERS uint* counters, uint slot) {
 #if CLR_GROUPED
     atomic_inc(counters + slot);
 #else
@@ -21,14 +21,14 @@ static inline void clr_count_one(CLR_COUNTERS uint* counters, uint slot) {
 #endif
 }
 
-static inline void clr_count_all(CLR_COUNTERS uint* counters, clr_uint slots) {
+CLR_FN void clr_count_all(CLR_COUNTERS uint* counters, clr_uint slots) {
     uint lane[CLR_WIDTH];
     clr_store(slots, lane);
     for (int i = 0; i < CLR_WIDTH; ++i) clr_count_one(counters, lane[i]);
 }
 
 // Counts the lanes i with 0 <= at + i step < count; a negative index is a large one here.
-static inline void clr_count_some(CLR_COUNTERS uint* counters, clr_uint slots, long at, int step, ulong count) {
+CLR_FN void clr_count_some(CLR_COUNTERS uint* counters, clr_uint slots, long at, int step, ulong count) {
     uint lane[CLR_WIDTH];
     clr_store(slots, lane);
     for (int i = 0; i < CLR_WIDTH; ++i)
@@ -44,12 +44,12 @@ typedef struct {
     uint waiting;       // 0 before the first step
 } clr_queue;
 
-static inline void clr_count_waiting(clr_queue queue, global uint* counters) {
+CLR_FN void clr_count_waiting(clr_queue queue, global uint* counters) {
     const local uint* slots = queue.slots + (queue.next ^ (2 * CLR_WIDTH));
     for (uint i = 0; i < queue.waiting; ++i) counters[slots[i]] += 1;
 }
 
-static inline clr_queue clr_count_later(clr_queue queue, global uint* counters, clr_uint even, clr_uint odd) {
+CLR_FN clr_queue clr_count_later(clr_queue queue, global uint* counters, clr_uint even, clr_uint odd) {
     local clr_uint* to = (local clr_uint*)(queue.slots + queue.next);
     to[0] = even;
     to[1] = odd;
@@ -60,14 +60,14 @@ static inline clr_queue clr_count_later(clr_queue queue, global uint* counters, 
 }
 #endif
 
-static inline void clr_group_barrier(void) {
+CLR_FN void clr_group_barrier(void) {
 #if CLR_GROUPED
     barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
 #endif
 }
 
 // The counters of this task, all 0: its row, or local memory that clr_finish_row copies there.
-static inline CLR_COUNTERS uint* clr_start_row(global uint* row, local uint* shared, uint slots) {
+CLR_FN CLR_COUNTERS uint* clr_start_row(global uint* row, local uint* shared, uint slots) {
 #if CLR_GROUPED && CLR_LOCAL_ROWS
     CLR_COUNTERS uint* counters = shared;
 #else
@@ -78,7 +78,7 @@ static inline CLR_COUNTERS uint* clr_start_row(global uint* row, local uint* sha
     return counters;
 }
 
-static inline void clr_finish_row(global uint* row, CLR_COUNTERS uint* counters, uint slots) {
+CLR_FN void clr_finish_row(global uint* row, CLR_COUNTERS uint* counters, uint slots) {
     clr_group_barrier();
 #if CLR_GROUPED && CLR_LOCAL_ROWS
     for (uint k = get_local_id(0); k < slots; k += get_local_size(0)) row[k] = counters[k];
@@ -86,7 +86,7 @@ static inline void clr_finish_row(global uint* row, CLR_COUNTERS uint* counters,
 }
 
 // The vectors of part `part` for this work-item.
-static inline clr_span clr_part_span(uint part, ulong per_part, ulong vectors) {
+CLR_FN clr_span clr_part_span(uint part, ulong per_part, ulong vectors) {
     clr_span s;
     s.begin = min(vectors, part * per_part) + get_local_id(0);
     s.end = min(vectors, (part + 1) * per_part);
@@ -95,7 +95,7 @@ static inline clr_span clr_part_span(uint part, ulong per_part, ulong vectors) {
 }
 
 // A copy: PoCL's work-items share a by-value argument that they write to.
-static inline clr_stream clr_stream_of(clr_stream stream, uint model) {
+CLR_FN clr_stream clr_stream_of(clr_stream stream, uint model) {
     stream.id += model;
     return stream;
 }

@@ -9,7 +9,7 @@ typedef struct {
     clr_u32 unused;
 } clr_law_task;
 
-static inline clr_law_lanes clr_same_model(clr_law m) {
+CLR_FN clr_law_lanes clr_same_model(clr_law m) {
     clr_law_lanes r;
     r.s = (clr_real)(m.s);
     r.a = (clr_real)(m.a);
@@ -20,7 +20,7 @@ static inline clr_law_lanes clr_same_model(clr_law m) {
 }
 
 // The models of values first .. first + CLR_WIDTH - 1; lanes past the end repeat the last one.
-static inline clr_law_lanes clr_load_models(global const clr_law* models, ulong first, ulong count, ulong points) {
+CLR_FN clr_law_lanes clr_load_models(global const clr_law* models, ulong first, ulong count, ulong points) {
     const ulong begin = first / points;
     if (begin == (first + CLR_WIDTH - 1) / points) return clr_same_model(models[begin]);
     float s[CLR_WIDTH], a[CLR_WIDTH], b[CLR_WIDTH], inverse_sd[CLR_WIDTH], half_turn[CLR_WIDTH];
@@ -41,7 +41,7 @@ static inline clr_law_lanes clr_load_models(global const clr_law* models, ulong 
     return r;
 }
 
-static inline clr_real clr_load_points(global const float* x, clr_law_task task, ulong first, ulong count) {
+CLR_FN clr_real clr_load_points(global const float* x, clr_law_task task, ulong first, ulong count) {
     if (!task.shared_x) return clr_load_view(x, task.x, first, count);
     const ulong begin = first - first / task.points * task.points;
     if (begin + CLR_WIDTH <= task.points) return clr_load_view(x, task.x, begin, task.points);

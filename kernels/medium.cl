@@ -8,7 +8,7 @@ typedef struct {
     uint row, column, pixel, lanes;
 } clr_pixels;
 
-static inline clr_pixels clr_pixels_of(clr_medium s, uint row, uint vector) {
+CLR_FN clr_pixels clr_pixels_of(clr_medium s, uint row, uint vector) {
     clr_pixels p;
     p.row = row;
     p.column = vector * CLR_WIDTH;
@@ -17,11 +17,10 @@ static inline clr_pixels clr_pixels_of(clr_medium s, uint row, uint vector) {
     return p;
 }
 
-static inline uint clr_vectors_a_row(clr_medium s) { return (s.width + CLR_WIDTH - 1) / CLR_WIDTH; }
+CLR_FN uint clr_vectors_a_row(clr_medium s) { return (s.width + CLR_WIDTH - 1) / CLR_WIDTH; }
 
 // The lanes of channel c, in the device's order of channels, become values 3 (first + lane) + c of the view.
-static inline void clr_store_channels(const clr_real* v, clr_medium s, global float* p, clr_layout view, ulong first,
-                                      uint lanes) {
+CLR_FN void clr_store_channels(const clr_real* v, clr_medium s, global float* p, clr_layout view, ulong first, uint lanes) {
     p += view.offset;
     for (int c = 0; c < 3; ++c) {
         float lane[CLR_WIDTH];
@@ -105,7 +104,7 @@ typedef struct {
     uint levels;
 } clr_tally;
 
-static inline void clr_count_slot(global uint* counter) {
+CLR_FN void clr_count_slot(global uint* counter) {
 #if CLR_GROUPED
     atomic_inc(counter);
 #else
@@ -113,7 +112,7 @@ static inline void clr_count_slot(global uint* counter) {
 #endif
 }
 
-static inline void clr_count_error(clr_tally tally, global uint* counters, clr_real e, clr_mask valid) {
+CLR_FN void clr_count_error(clr_tally tally, global uint* counters, clr_real e, clr_mask valid) {
     const clr_uint slot = clr_slot(tally.bins, e);
     const clr_mask atom = clr_abs(e) <= (clr_real)(CLR_ATOM);
     const clr_uint where = atom ? (clr_uint)(tally.bins.count + CLR_ATOM_SLOT) : slot;
@@ -122,7 +121,7 @@ static inline void clr_count_error(clr_tally tally, global uint* counters, clr_r
     for (int i = 0; i < CLR_WIDTH; ++i) clr_count_slot(counters + lane[i]);
 }
 
-static inline void clr_count_zeros(clr_tally tally, global uint* counters, clr_mask zero) {
+CLR_FN void clr_count_zeros(clr_tally tally, global uint* counters, clr_mask zero) {
     if (!clr_any(zero)) return;
     uint lane[CLR_WIDTH];
     clr_store(zero ? (clr_uint)(1u) : (clr_uint)(0u), lane);
@@ -131,25 +130,25 @@ static inline void clr_count_zeros(clr_tally tally, global uint* counters, clr_m
 }
 
 // sums[0], sums[1]: errors and their squares, of each lane.
-static inline void clr_sum_error(clr_tally tally, clr_wide* sums, clr_real e, clr_mask valid) {
+CLR_FN void clr_sum_error(clr_tally tally, clr_wide* sums, clr_real e, clr_mask valid) {
     const clr_int units = clr_error_units(e, tally.inverse_unit);
     const clr_wide wide = clr_to_wide(valid ? units : (clr_int)(0));
     sums[0] += wide;
     sums[1] += (wide * wide + (clr_wide)(2048)) >> 12;
 }
 
-static inline ulong clr_lane_sum(clr_wide v) {
+CLR_FN ulong clr_lane_sum(clr_wide v) {
     ulong lane[CLR_WIDTH], sum = 0;
     clr_store(v, lane);
     for (int i = 0; i < CLR_WIDTH; ++i) sum += lane[i];
     return sum;
 }
 
-static inline clr_mask clr_lanes_below(uint lanes) { return clr_to_int(clr_lanes()) < (clr_int)((int)lanes); }
+CLR_FN clr_mask clr_lanes_below(uint lanes) { return clr_to_int(clr_lanes()) < (clr_int)((int)lanes); }
 
-static inline void clr_tally_level(clr_tally tally, global uint* counters, clr_wide* sums, clr_medium s,
-                                   clr_medium_sums samples, const clr_real* t, float inverse_samples,
-                                   const clr_medium_ray* ray, const clr_real* share, clr_mask valid) {
+CLR_FN void clr_tally_level(clr_tally tally, global uint* counters, clr_wide* sums, clr_medium s, clr_medium_sums samples,
+                            const clr_real* t, float inverse_samples, const clr_medium_ray* ray, const clr_real* share,
+                            clr_mask valid) {
     const uint slots = tally.bins.count + CLR_ERROR_SLOTS;
     for (int c = 0; c < 3; ++c) {
         const uint plain = s.channel[c], ratio = 3 + plain;

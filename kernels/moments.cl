@@ -6,9 +6,9 @@
 #define CLR_M(k) m##k,
 #define CLR_T(k) t##k,
 
-static inline clr_uint clr_one_where(clr_mask m) { return m ? (clr_uint)(1u) : (clr_uint)(0u); }
+CLR_FN clr_uint clr_one_where(clr_mask m) { return m ? (clr_uint)(1u) : (clr_uint)(0u); }
 
-static inline clr_entry clr_entry_of(const clr_batch* batch) {
+CLR_FN clr_entry clr_entry_of(const clr_batch* batch) {
     clr_entry e;
     e.share = clr_both(batch->share_hi, batch->share_lo);
     e.spread = clr_both(batch->spread_hi, batch->spread_lo);
@@ -35,14 +35,13 @@ typedef struct {
     clr_real doubt[CLR_BLOCK];  // not 0 in lanes that lost a batch, or met a NaN or an infinity
 } clr_block;
 
-static inline clr_real clr_lost_before(clr_planes planes, clr_state s, ulong i) {
+CLR_FN clr_real clr_lost_before(clr_planes planes, clr_state s, ulong i) {
     if (!(s.options & CLR_STATE_PER_VALUE)) return (clr_real)(0.0f);
     return clr_load_batches(planes, s, i) == (clr_uint)(s.group.batches) ? (clr_real)(0.0f) : (clr_real)(1.0f);
 }
 
 // What a batch brings to vector v: how many negative values, and whether any is not finite.
-static inline void clr_look(global const float* m_from, global const float* t_from, uint v, clr_real* doubt,
-                            clr_uint* below) {
+CLR_FN void clr_look(global const float* m_from, global const float* t_from, uint v, clr_real* doubt, clr_uint* below) {
     const clr_real zero = (clr_real)(0.0f);
     const clr_real m = clr_load(m_from + v * CLR_WIDTH), t = clr_load(t_from + v * CLR_WIDTH);
     *doubt = clr_fma(m, zero, clr_fma(t, zero, *doubt));
@@ -52,9 +51,8 @@ static inline void clr_look(global const float* m_from, global const float* t_fr
 // Batch k over a block of whole vectors of contiguous values. The first pass takes the state from the planes, the last one
 // puts it back, save for vectors in doubt: those it returns, a bit each, untouched. Each batch is looked at one pass before
 // it is added, which also brings it into the cache: measured, a tenth off the time of 8 batches.
-static inline uint clr_pass(const bool is_first, const bool is_last, uint k, const clr_inputs* in,
-                            const clr_batches* batches, clr_block* block, clr_planes planes, clr_state s, ulong first,
-                            clr_uint* negative) {
+CLR_FN uint clr_pass(const bool is_first, const bool is_last, uint k, const clr_inputs* in, const clr_batches* batches,
+                     clr_block* block, clr_planes planes, clr_state s, ulong first, clr_uint* negative) {
     const clr_batch batch = batches->of[k];
     const uint next = is_last ? k : k + 1;
     global const float* m_from = in->m[k] + batch.m.offset + first;
@@ -88,8 +86,8 @@ static inline uint clr_pass(const bool is_first, const bool is_last, uint k, con
     return doubtful;
 }
 
-static inline uint clr_add_block(const clr_inputs* in, const clr_batches* batches, clr_planes planes, clr_state s,
-                                 ulong first, clr_uint* negative) {
+CLR_FN uint clr_add_block(const clr_inputs* in, const clr_batches* batches, clr_planes planes, clr_state s, ulong first,
+                          clr_uint* negative) {
     clr_block block;
     const uint last = batches->count - 1;
     if (last == 0) return clr_pass(true, true, 0, in, batches, &block, planes, s, first, negative);
@@ -99,8 +97,8 @@ static inline uint clr_add_block(const clr_inputs* in, const clr_batches* batche
 }
 
 // Any vector: each value has a share of its own in each batch.
-static inline void clr_add_vector(const clr_inputs* in, const clr_batches* batches, clr_planes planes, clr_state s,
-                                  ulong first, ulong count, clr_uint* negative, clr_uint* skipped) {
+CLR_FN void clr_add_vector(const clr_inputs* in, const clr_batches* batches, clr_planes planes, clr_state s, ulong first,
+                           ulong count, clr_uint* negative, clr_uint* skipped) {
     const clr_real zero = (clr_real)(0.0f);
     const bool skips = s.options & CLR_STATE_PER_VALUE;
     clr_record r = clr_load_record(planes, s, first);

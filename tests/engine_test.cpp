@@ -1,6 +1,7 @@
 #include "clratio/engine.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cstdlib>
 #include <filesystem>
@@ -12,6 +13,7 @@
 #include "embedded.hpp"
 #include "engine_state.hpp"
 #include "launch.hpp"
+#include "support/raw_kernel.hpp"
 #include "support/scratch.hpp"
 #include "support/shapes.hpp"
 
@@ -110,6 +112,32 @@ TEST(Engine, nothing_is_compiled_before_it_is_needed) {
     EXPECT_TRUE(engine.state().programs.empty());
     small_job(engine);
     EXPECT_EQ(engine.state().programs.size(), 1u);
+}
+
+/// Every option that some kernel must be told; the last one keeps builds out of the driver's own cache.
+std::string options_of_all_kernels() {
+    return "-DCLR_GENERATOR=CLR_PHILOX -DCLR_LOCAL_ROWS=1 -DCLR_SAMPLING=6u -DCLR_INDEPENDENT_T=1 -DCLR_BUILT_BY=" +
+           std::to_string(getpid());
+}
+
+// Drivers print warnings on the stderr of the program that builds, which is not theirs.
+TEST(Engine, builds_say_nothing) {
+    for (const int width : {8, 16}) {
+        const Engine engine({.width = width, .disk_cache = false});
+        testing::internal::CaptureStderr();
+        for (const auto& file : embedded_files) {
+            const std::filesystem::path path(file.path);
+            if (path.extension() == ".cl") program(engine.state(), path.stem(), width, options_of_all_kernels());
+        }
+        EXPECT_EQ(testing::internal::GetCapturedStderr(), "") << width << " lanes";
+    }
+}
+
+TEST(Engine, a_build_that_warns_would_be_heard) {
+    const Engine engine;
+    testing::internal::CaptureStderr();
+    RawKernel(engine, "#warning\nkernel void k(global int* p) { *p = 1; }", "k", options_of_all_kernels());
+    EXPECT_NE(testing::internal::GetCapturedStderr(), "");
 }
 
 TEST(Engine, a_failed_build_carries_the_log_with_the_real_file_and_line) {

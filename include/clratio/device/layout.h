@@ -25,7 +25,7 @@ typedef struct {
     ulong begin, end, step;
 } clr_span;
 
-static inline clr_span clr_my_span(clr_range range) {
+CLR_FN clr_span clr_my_span(clr_range range) {
     clr_span s;
     const ulong vectors = (range.count + CLR_WIDTH - 1) / CLR_WIDTH;
 #if CLR_GROUPED
@@ -41,7 +41,7 @@ static inline clr_span clr_my_span(clr_range range) {
 }
 
 // The lanes first .. first + CLR_WIDTH - 1 of a view of `count` values; lanes past the end are 0.
-static inline clr_real clr_load_view(global const float* p, clr_layout view, ulong first, ulong count) {
+CLR_FN clr_real clr_load_view(global const float* p, clr_layout view, ulong first, ulong count) {
     p += view.offset;
     if (view.stride == view.channels && first + CLR_WIDTH <= count) return clr_load(p + first);
     if (view.stride == 0 && view.channels == 1) return (clr_real)(*p);
@@ -58,7 +58,7 @@ static inline clr_real clr_load_view(global const float* p, clr_layout view, ulo
     return clr_load(lane);
 }
 
-static inline void clr_store_view(clr_real v, global float* p, clr_layout view, ulong first, ulong count) {
+CLR_FN void clr_store_view(clr_real v, global float* p, clr_layout view, ulong first, ulong count) {
     p += view.offset;
     if (view.stride == view.channels && first + CLR_WIDTH <= count) {
         clr_store(v, p + first);
@@ -79,7 +79,7 @@ static inline void clr_store_view(clr_real v, global float* p, clr_layout view, 
 
 // The same for a view that no kernel argument reads: a large one goes past the caches, which would read each line before it
 // is written.
-static inline void clr_store_apart(clr_real v, global float* p, clr_layout view, ulong first, ulong count) {
+CLR_FN void clr_store_apart(clr_real v, global float* p, clr_layout view, ulong first, ulong count) {
 #if CLR_WIDTH == 32
     global float* to = p + view.offset + first;
     const bool large = count >= 1ul << 20, whole = view.stride == view.channels && first + CLR_WIDTH <= count;

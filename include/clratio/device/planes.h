@@ -83,35 +83,33 @@ typedef struct {
     { s##_m, s##_t, s##_mm, s##_tt, s##_mt, s##_weight, s##_weight2, s##_batches, s##_quotient, s##_zero_m, s##_zero_share }
 
 // Where the values from i on have their elements in a plane of one element each; i is the first of a vector.
-static inline ulong clr_element(clr_state s, ulong i) {
-    return (i / CLR_TILE * s.groups + s.place) * CLR_TILE + i % CLR_TILE;
-}
+CLR_FN ulong clr_element(clr_state s, ulong i) { return (i / CLR_TILE * s.groups + s.place) * CLR_TILE + i % CLR_TILE; }
 
 // The same for hi parts; lo parts are CLR_TILE further.
-static inline ulong clr_element_of_two(clr_state s, ulong i) {
+CLR_FN ulong clr_element_of_two(clr_state s, ulong i) {
     return (i / CLR_TILE * s.groups + s.place) * (2 * CLR_TILE) + i % CLR_TILE;
 }
 
-static inline clr_two clr_both(float hi, float lo) { return clr_two_make((clr_real)(hi), (clr_real)(lo)); }
+CLR_FN clr_two clr_both(float hi, float lo) { return clr_two_make((clr_real)(hi), (clr_real)(lo)); }
 
-static inline clr_evidence clr_evidence_of_group(clr_group g, uint reliability) {
+CLR_FN clr_evidence clr_evidence_of_group(clr_group g, uint reliability) {
     return clr_evidence_of((clr_uint)(g.batches), clr_both(g.weight_hi, g.weight_lo), clr_both(g.weight2_hi, g.weight2_lo),
                            reliability);
 }
 
-static inline void clr_store_two(clr_two v, global float* p, clr_state s, ulong i) {
+CLR_FN void clr_store_two(clr_two v, global float* p, clr_state s, ulong i) {
     clr_store(v.hi, p + clr_element_of_two(s, i));
     clr_store(v.lo, p + clr_element_of_two(s, i) + CLR_TILE);
 }
 
 // A group without batches is zero, whatever its planes hold: they are never cleared.
-static inline clr_two clr_load_plane(global const float* p, clr_state s, ulong i) {
+CLR_FN clr_two clr_load_plane(global const float* p, clr_state s, ulong i) {
     if (s.group.batches == 0) return clr_both(0.0f, 0.0f);
     p += clr_element_of_two(s, i);
     return clr_two_make(clr_load(p), clr_load(p + CLR_TILE));
 }
 
-static inline clr_moments clr_load_moments(clr_planes p, clr_state s, ulong i) {
+CLR_FN clr_moments clr_load_moments(clr_planes p, clr_state s, ulong i) {
     clr_moments r;
     r.m = clr_load_plane(p.m, s, i);
     r.t = clr_load_plane(p.t, s, i);
@@ -121,7 +119,7 @@ static inline clr_moments clr_load_moments(clr_planes p, clr_state s, ulong i) {
     return r;
 }
 
-static inline void clr_store_moments(clr_moments r, clr_planes p, clr_state s, ulong i) {
+CLR_FN void clr_store_moments(clr_moments r, clr_planes p, clr_state s, ulong i) {
     clr_store_two(r.m, p.m, s, i);
     clr_store_two(r.t, p.t, s, i);
     clr_store_two(r.mm, p.mm, s, i);
@@ -129,14 +127,13 @@ static inline void clr_store_moments(clr_moments r, clr_planes p, clr_state s, u
     clr_store_two(r.mt, p.mt, s, i);
 }
 
-static inline void clr_store_evidence(clr_two weight, clr_two weight2, clr_uint batches, clr_planes p, clr_state s,
-                                      ulong i) {
+CLR_FN void clr_store_evidence(clr_two weight, clr_two weight2, clr_uint batches, clr_planes p, clr_state s, ulong i) {
     clr_store_two(weight, p.weight, s, i);
     if (s.options & CLR_STATE_RELIABILITY) clr_store_two(weight2, p.weight2, s, i);
     clr_store(clr_from_bits(batches), p.batches + clr_element(s, i));
 }
 
-static inline clr_ratios clr_load_ratios(clr_planes p, clr_state s, ulong i) {
+CLR_FN clr_ratios clr_load_ratios(clr_planes p, clr_state s, ulong i) {
     clr_ratios r;
     r.quotient = clr_load_plane(p.quotient, s, i);
     r.zero_m = clr_load_plane(p.zero_m, s, i);
@@ -144,17 +141,17 @@ static inline clr_ratios clr_load_ratios(clr_planes p, clr_state s, ulong i) {
     return r;
 }
 
-static inline clr_uint clr_load_batches(clr_planes p, clr_state s, ulong i) {
+CLR_FN clr_uint clr_load_batches(clr_planes p, clr_state s, ulong i) {
     return s.group.batches == 0 ? (clr_uint)(0u) : clr_bits(clr_load(p.batches + clr_element(s, i)));
 }
 
-static inline void clr_store_ratios(clr_ratios r, clr_planes p, clr_state s, ulong i) {
+CLR_FN void clr_store_ratios(clr_ratios r, clr_planes p, clr_state s, ulong i) {
     clr_store_two(r.quotient, p.quotient, s, i);
     clr_store_two(r.zero_m, p.zero_m, s, i);
     clr_store_two(r.zero_share, p.zero_share, s, i);
 }
 
-static inline clr_record clr_load_record(clr_planes p, clr_state s, ulong i) {
+CLR_FN clr_record clr_load_record(clr_planes p, clr_state s, ulong i) {
     clr_record r;
     r.moments = clr_load_moments(p, s, i);
     r.weight = clr_both(s.group.weight_hi, s.group.weight_lo);
@@ -170,13 +167,13 @@ static inline clr_record clr_load_record(clr_planes p, clr_state s, ulong i) {
     return r;
 }
 
-static inline void clr_store_record(clr_record r, clr_planes p, clr_state s, ulong i) {
+CLR_FN void clr_store_record(clr_record r, clr_planes p, clr_state s, ulong i) {
     clr_store_moments(r.moments, p, s, i);
     if (s.options & CLR_STATE_PER_VALUE) clr_store_evidence(r.weight, r.weight2, r.batches, p, s, i);
     if (s.options & CLR_STATE_RATIOS) clr_store_ratios(r.ratios, p, s, i);
 }
 
-static inline ulong clr_sum_lanes(clr_uint v) {
+CLR_FN ulong clr_sum_lanes(clr_uint v) {
     uint lane[CLR_WIDTH];
     clr_store(v, lane);
     ulong sum = 0;
@@ -185,7 +182,7 @@ static inline ulong clr_sum_lanes(clr_uint v) {
 }
 
 // All ones in the lanes first + lane < count, else 0.
-static inline clr_uint clr_lanes_below(ulong first, ulong count) {
+CLR_FN clr_uint clr_lanes_below(ulong first, ulong count) {
     uint lane[CLR_WIDTH];
     for (int i = 0; i < CLR_WIDTH; ++i) lane[i] = first + i < count ? 0xffffffffu : 0u;
     return clr_load(lane);
@@ -195,13 +192,13 @@ typedef struct {
     clr_uint of[CLR_TALLY_FLAGS];
 } clr_flag_tally;
 
-static inline void clr_count_flags(clr_flag_tally* tally, clr_uint flags, uint counted) {
+CLR_FN void clr_count_flags(clr_flag_tally* tally, clr_uint flags, uint counted) {
     if (!clr_any(flags != (clr_uint)(0u))) return;
     for (uint bit = 0; bit < CLR_FLAG_BITS; ++bit) tally->of[bit] += (flags >> bit) & (clr_uint)(1u);
     tally->of[CLR_FLAG_BITS] += (flags & (clr_uint)(counted)) != (clr_uint)(0u) ? (clr_uint)(1u) : (clr_uint)(0u);
 }
 
-static inline void clr_store_flag_tally(const clr_flag_tally* tally, global ulong* rows) {
+CLR_FN void clr_store_flag_tally(const clr_flag_tally* tally, global ulong* rows) {
     if (!rows) return;
     for (uint k = 0; k < CLR_TALLY_FLAGS; ++k) rows[get_global_id(0) * CLR_TALLY_FLAGS + k] = clr_sum_lanes(tally->of[k]);
 }
@@ -218,7 +215,7 @@ typedef struct {
 } clr_outputs;
 
 // The interval's quantile for each value's own number of batches; beyond the table, that of the whole state.
-static inline clr_real clr_quantile_for(clr_uint batches, clr_reading reading, global const float* quantiles) {
+CLR_FN clr_real clr_quantile_for(clr_uint batches, clr_reading reading, global const float* quantiles) {
     if (reading.quantiles == 0) return (clr_real)(reading.quantile);
     uint count[CLR_WIDTH];
     float lane[CLR_WIDTH];
@@ -227,8 +224,8 @@ static inline clr_real clr_quantile_for(clr_uint batches, clr_reading reading, g
     return clr_load(lane);
 }
 
-static inline void clr_write_reading(clr_estimate e, clr_reading reading, uint wanted, clr_outputs to, clr_flag_tally* tally,
-                                     ulong first, ulong count) {
+CLR_FN void clr_write_reading(clr_estimate e, clr_reading reading, uint wanted, clr_outputs to, clr_flag_tally* tally,
+                              ulong first, ulong count) {
     const clr_layout packed = {0, 1, 1};
     if (wanted & CLR_WRITE_ESTIMATE) clr_store_apart(e.value, to.estimate, reading.estimate, first, count);
     if (wanted & CLR_WRITE_ERROR) clr_store_apart(e.error, to.error, reading.error, first, count);

@@ -9,7 +9,7 @@
 // put: lane i becomes value at + i of the view, where 0 <= at + i < count; other lanes are dropped.
 // zip: the lanes of a and b in turn. put_pairs, put_quads: vectors whose lanes come in turn.
 #define CLR_PUT(name, vector, element)                                                                                      \
-    static inline void name(vector v, global element* p, clr_layout view, long at, ulong count) {                           \
+    CLR_FN void name(vector v, global element* p, clr_layout view, long at, ulong count) {                                  \
         p += view.offset;                                                                                                   \
         if (view.stride == view.channels && at >= 0 && (ulong)at + CLR_WIDTH <= count) {                                    \
             if (((ulong)(p + at) & (sizeof(v) - 1)) == 0)                                                                   \
@@ -26,12 +26,12 @@
             p[pixel * view.stride + ((ulong)(at + i) - pixel * view.channels)] = lane[i];                                   \
         }                                                                                                                   \
     }                                                                                                                       \
-    static inline void name##_pairs(vector a, vector b, global element* p, clr_layout view, long at, ulong count) {         \
+    CLR_FN void name##_pairs(vector a, vector b, global element* p, clr_layout view, long at, ulong count) {                \
         name(CLR_ZIP_LOW(vector, a, b), p, view, at, count);                                                                \
         name(CLR_ZIP_HIGH(vector, a, b), p, view, at + CLR_WIDTH, count);                                                   \
     }                                                                                                                       \
-    static inline void name##_quads(vector a, vector b, vector c, vector d, global element* p, clr_layout view, long at,    \
-                                    ulong count) {                                                                          \
+    CLR_FN void name##_quads(vector a, vector b, vector c, vector d, global element* p, clr_layout view, long at,           \
+                             ulong count) {                                                                                 \
         name##_pairs(CLR_ZIP_LOW(vector, a, c), CLR_ZIP_LOW(vector, b, d), p, view, at, count);                             \
         name##_pairs(CLR_ZIP_HIGH(vector, a, c), CLR_ZIP_HIGH(vector, b, d), p, view, at + 2 * CLR_WIDTH, count);           \
     }
