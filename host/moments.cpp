@@ -25,8 +25,8 @@ device::clr_batch describe(const View& m, const View& t, const Group& before, co
     const clr_two sum = device::clr_two_add(before.weight, more.weight);
     const clr_two sum2 = device::clr_two_add(before.weight2, more.weight2);
     const auto e = device::clr_entry_make(before.weight, more.weight, sum);
-    return {layout(m),   layout(t),   more.weight.hi, more.weight.lo, e.share.hi, e.share.lo,
-            e.spread.hi, e.spread.lo, sum.hi,         sum.lo,         sum2.hi,    sum2.lo};
+    return {layout(m), layout(t), more.weight.hi, more.weight.lo, e.share.hi, e.share.lo,
+            e.spread,  sum.hi,    sum.lo,         sum2.hi,        sum2.lo};
 }
 
 Group group_of(const Batch& b) {
@@ -107,8 +107,7 @@ void describe_members(device::clr_groups& all) {
     }
     for (std::uint32_t g = 0; g < all.count; ++g) {
         const clr_part part = clr_part_of(weight_of(g), sum);
-        all.member[g] = {
-            entries[g].share.hi, entries[g].share.lo, entries[g].spread.hi, entries[g].spread.lo, part.p, part.a};
+        all.member[g] = {entries[g].share.hi, entries[g].share.lo, entries[g].spread, part.p, part.a};
     }
 }
 

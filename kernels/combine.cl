@@ -52,7 +52,7 @@ CLR_FN clr_record clr_join(clr_record all, clr_record more, const clr_groups* gr
     const clr_member member = groups->member[g];
     clr_entry entry;
     entry.share = clr_both(member.share_hi, member.share_lo);
-    entry.spread = clr_both(member.spread_hi, member.spread_lo);
+    entry.spread = (clr_real)(member.spread);
     all.moments = clr_moments_join(all.moments, more.moments, entry);
     if (with_ratios) all.ratios = clr_ratios_merge(all.ratios, more.ratios, entry);
     return all;

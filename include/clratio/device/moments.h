@@ -19,8 +19,8 @@ typedef struct {
 
 // How a batch of weight w enters a state of weight W.
 typedef struct {
-    clr_two share;   // w / (W + w)
-    clr_two spread;  // W w / (W + w)
+    clr_two share;    // w / (W + w)
+    clr_real spread;  // W w / (W + w): mm, tt and mt share its rounding, which is a weight's, below 2^-24 of it
 } clr_entry;
 
 CLR_FN clr_entry clr_entry_make(clr_two weight, clr_two added, clr_two sum) {
@@ -28,7 +28,7 @@ CLR_FN clr_entry clr_entry_make(clr_two weight, clr_two added, clr_two sum) {
     const clr_mask none = sum.hi == (clr_real)(0.0f);
     const clr_two divisor = clr_two_make(none ? (clr_real)(1.0f) : sum.hi, sum.lo);
     e.share = clr_two_divide(added, divisor);
-    e.spread = clr_two_multiply(weight, e.share);
+    e.spread = clr_two_nearest(clr_two_multiply(weight, e.share));
     return e;
 }
 
@@ -49,13 +49,13 @@ CLR_FN clr_moments clr_moments_settle(clr_moments s) {
 
 // Moves the means by dm, dt times their share, and adds the second moments that two parts gain by standing that far apart.
 CLR_FN clr_moments clr_moments_move(clr_moments s, clr_two dm, clr_two dt, clr_entry e) {
-    const clr_two um = clr_two_multiply(dm, e.spread);
-    const clr_two ut = clr_two_multiply(dt, e.spread);
+    const clr_two um = clr_two_scale(dm, e.spread);
+    const clr_two ut = clr_two_scale(dt, e.spread);
     s.mm = clr_two_gather(s.mm, clr_two_multiply(um, dm));
     s.tt = clr_two_gather(s.tt, clr_two_multiply(ut, dt));
     s.mt = clr_two_gather(s.mt, clr_two_multiply(um, dt));
-    s.m = clr_two_gather(s.m, clr_two_multiply(dm, e.share));
-    s.t = clr_two_gather(s.t, clr_two_multiply(dt, e.share));
+    s.m = clr_two_gather(s.m, clr_two_times(dm, e.share));
+    s.t = clr_two_gather(s.t, clr_two_times(dt, e.share));
     return s;
 }
 

@@ -13,7 +13,7 @@ CLR_NAMESPACE_BEGIN
 // after it, of a value that skipped nothing.
 typedef struct {
     clr_layout m, t;
-    float weight_hi, weight_lo, share_hi, share_lo, spread_hi, spread_lo, sum_hi, sum_lo, sum2_hi, sum2_lo;
+    float weight_hi, weight_lo, share_hi, share_lo, spread, sum_hi, sum_lo, sum2_hi, sum2_lo;
 } clr_batch;
 
 typedef struct {
@@ -46,7 +46,7 @@ typedef struct {
 
 // Where no value has skipped a batch: how a group joins those before it, and its clr_part of them all.
 typedef struct {
-    float share_hi, share_lo, spread_hi, spread_lo, p, a;
+    float share_hi, share_lo, spread, p, a;
 } clr_member;
 
 // All groups of a state.

@@ -90,6 +90,18 @@ CLR_FN clr_two clr_two_multiply(clr_two x, clr_two y) {
     return clr_two_make(p.hi, clr_fma(x.lo, y.lo, clr_fma(x.hi, y.lo, clr_fma(x.lo, y.hi, p.lo))));
 }
 
+// The same for a tight y: x.lo y.lo is then below what rounding lo costs.
+CLR_FN clr_two clr_two_times(clr_two x, clr_two y) {
+    const clr_two p = clr_two_product(x.hi, y.hi);
+    return clr_two_make(p.hi, clr_fma(x.lo, y.hi, clr_fma(x.hi, y.lo, p.lo)));
+}
+
+// The same for a plain y.
+CLR_FN clr_two clr_two_scale(clr_two x, clr_real y) {
+    const clr_two p = clr_two_product(x.hi, y);
+    return clr_two_make(p.hi, clr_fma(x.lo, y, p.lo));
+}
+
 // x^2, tight.
 CLR_FN clr_two clr_two_square(clr_two x) { return clr_two_settle(clr_two_multiply(x, x)); }
 
