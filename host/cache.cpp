@@ -2,12 +2,12 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
-#include <iterator>
 
 namespace clratio::cache {
 namespace {
@@ -41,9 +41,11 @@ std::filesystem::path entry(const std::filesystem::path& folder, const std::stri
 
 // magic | key, 0 | payload | fnv1a of all before
 std::optional<std::vector<unsigned char>> load(const std::filesystem::path& path, const std::string& key) {
-    std::ifstream in(path, std::ios::binary);
+    std::ifstream in(path, std::ios::binary | std::ios::ate);
     if (!in) return std::nullopt;
-    const std::vector<unsigned char> all{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+    std::vector<unsigned char> all(static_cast<std::size_t>(std::max<std::streamoff>(in.tellg(), 0)));
+    if (!in.seekg(0).read(reinterpret_cast<char*>(all.data()), static_cast<std::streamsize>(all.size())))
+        return std::nullopt;
     std::vector<unsigned char> head;
     append(head, magic, sizeof magic - 1);
     append(head, key.c_str(), key.size() + 1);

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "large.hpp"
 #include "moments_state.hpp"
 
 namespace clratio {
@@ -28,12 +29,16 @@ double quantile_for(const CombineOptions& options, std::uint64_t batches) {
 
 constexpr std::uint64_t longest_table = 1024;
 
-/// For states whose values may differ in their number of batches.
-Buffer quantile_table(const Moments::State& s, const CombineOptions& options) {
+/// Where values may differ in their number of batches.
+Buffer quantile_table(const Engine& engine, std::uint64_t batches, const CombineOptions& options) {
     std::vector<float> table;
-    for (std::uint64_t k = 0; k <= std::min(s.batches(), longest_table); ++k)
+    for (std::uint64_t k = 0; k <= std::min(batches, longest_table); ++k)
         table.push_back(static_cast<float>(quantile_for(options, k)));
-    return Buffer::copy_of(s.engine, std::as_bytes(std::span(table)));
+    return Buffer::copy_of(engine, std::as_bytes(std::span(table)));
+}
+
+void check_size(const char* name, std::uint64_t size, std::uint64_t expected) {
+    if (size != expected) throw InvalidArgument(name, std::to_string(expected) + " values", std::to_string(size));
 }
 
 /// tau on the device, as long as the call needs it.
@@ -42,88 +47,121 @@ struct DeviceTau {
     View view;
 };
 
-DeviceTau put(const Engine& engine, const Tau& tau, std::uint64_t count) {
-    if (tau.numbers.empty()) {
-        if (tau.image.size() != count)
-            throw InvalidArgument("tau", std::to_string(count) + " values", std::to_string(tau.image.size()));
-        Buffer b = Buffer::from_host(engine, std::as_bytes(tau.image));
-        return {b, {b.mem(), 0, count}};
-    }
+void check_tau(const Tau& tau, std::uint64_t count) {
+    if (tau.numbers.empty()) return check_size("tau", tau.image.size(), count);
     for (float x : tau.numbers)
         if (!std::isfinite(x)) throw InvalidArgument("tau", "a finite number", std::to_string(x));
     if (count % tau.channels != 0)
         throw InvalidArgument("tau", "as many numbers as channels",
                               std::to_string(tau.channels) + " for " + std::to_string(count) + " values");
+}
+
+DeviceTau put(const Engine& engine, const Tau& tau, std::uint64_t count) {
+    check_tau(tau, count);
+    if (tau.numbers.empty()) {
+        Buffer b = Buffer::from_host(engine, std::as_bytes(tau.image));
+        return {b, {b.mem(), 0, count}};
+    }
     Buffer b(engine, tau.numbers.size() * sizeof(float));
     b.write(std::as_bytes(std::span(tau.numbers)));
     return {b, {b.mem(), 0, count, 0, tau.channels}};
 }
 
-/// Host results of a blocking read-out, with the buffers that stand on them.
+Tau slice(const Tau& tau, std::uint64_t begin, std::uint64_t size) {
+    return tau.numbers.empty() ? Tau(tau.image.subspan(begin, size)) : tau;
+}
+
+std::vector<HostBatch> slices(std::span<const HostBatch> batches, std::uint64_t begin, std::uint64_t size) {
+    std::vector<HostBatch> out;
+    for (const HostBatch& b : batches)
+        out.push_back({b.m.subspan(begin, size), b.t.subspan(begin, size), b.weight, b.index});
+    return out;
+}
+
+/// As many as one allocation holds; whole pixels.
+std::uint64_t values_in_a_part(const Engine& engine, const Tau& tau) {
+    const std::uint64_t most = std::max<std::uint64_t>(engine.info().largest_allocation / sizeof(float), tau.channels);
+    return most / tau.channels * tau.channels;
+}
+
+/// A result of `count` values, with what the options ask for; its memory is that of `reuse`.
+Combined sized(std::uint64_t count, const CombineOptions& options, Combined reuse) {
+    const auto size_if = [&](bool wanted, auto& values) { resize_large(values, wanted ? count : 0); };
+    size_if(true, reuse.estimate);
+    size_if(options.flag_image, reuse.flag_image);
+    size_if(options.standard_error, reuse.standard_error);
+    size_if(options.bias, reuse.bias);
+    size_if(options.interval, reuse.lower);
+    size_if(options.interval, reuse.upper);
+    size_if(options.interval, reuse.kind);
+    size_if(options.gain, reuse.gain);
+    size_if(options.needed, reuse.needed);
+    reuse.flags = {};
+    reuse.negatives = 0;
+    return reuse;
+}
+
+/// Device buffers on `count` values of a result from `begin` on.
 class HostOutput {
 public:
-    HostOutput(const Engine& engine, std::uint64_t count, const CombineOptions& options, Combined reuse = {})
-        : engine_(engine), count_(count), result_(std::move(reuse)),
+    HostOutput(const Engine& engine, Combined& result, std::uint64_t begin, std::uint64_t count)
+        : engine_(engine), begin_(begin), count_(count), result_(result),
           rows_(Buffer::zeroed(engine, most_work_items(engine) * CLR_TALLY_FLAGS * sizeof(std::uint64_t))) {
-        const auto view = [&](std::vector<float>& values, bool wanted) { return View{place_if(wanted, values), 0, count}; };
-        out_.estimate = view(result_.estimate, true);
-        out_.flags = place_if(options.flag_image, result_.flag_image);
-        out_.standard_error = view(result_.standard_error, options.standard_error);
-        out_.bias = view(result_.bias, options.bias);
-        out_.lower = view(result_.lower, options.interval);
-        out_.upper = view(result_.upper, options.interval);
-        out_.kind = place_if(options.interval, result_.kind);
-        out_.gain = view(result_.gain, options.gain);
-        out_.needed = view(result_.needed, options.needed);
+        const auto view = [&](std::vector<float>& values) { return View{place(values), 0, count}; };
+        out_.estimate = view(result.estimate);
+        out_.flags = place(result.flag_image);
+        out_.standard_error = view(result.standard_error);
+        out_.bias = view(result.bias);
+        out_.lower = view(result.lower);
+        out_.upper = view(result.upper);
+        out_.kind = place(result.kind);
+        out_.gain = view(result.gain);
+        out_.needed = view(result.needed);
     }
 
     const CombineOutput& output() const { return out_; }
     Reading reading(const View& tau, const CombineOptions& options) const { return {tau, out_, options, rows_.mem()}; }
     cl_mem rows() const { return rows_.mem(); }
 
-    Combined take() {
+    /// Once the kernels are done.
+    void publish() {
         for (const Buffer& b : buffers_) b.publish();
-        std::vector<std::uint64_t> rows(rows_.size() / sizeof(std::uint64_t));
-        rows_.read(std::as_writable_bytes(std::span(rows)));
-        std::array<std::uint64_t, CLR_TALLY_FLAGS> sum{};
-        for (std::size_t i = 0; i < rows.size(); ++i) sum[i % sum.size()] += rows[i];
-        result_.flags = {sum[0], sum[1], sum[2], sum[3], sum[4], sum[5], sum[6], sum[7], sum[8]};
-        return std::move(result_);
+        const auto n = sums_of_rows<CLR_TALLY_FLAGS>(rows_);
+        result_.flags += {n[0], n[1], n[2], n[3], n[4], n[5], n[6], n[7], n[8]};
     }
 
 private:
-    template <class T> cl_mem place_if(bool wanted, std::vector<T>& values) {
-        values.resize(wanted ? count_ : 0);
-        if (!wanted) return nullptr;
-        buffers_.push_back(Buffer::onto_host(engine_, std::as_writable_bytes(std::span(values))));
+    template <class T> cl_mem place(std::vector<T>& values) {
+        if (values.empty()) return nullptr;
+        const auto part = std::span(values).subspan(begin_, count_);
+        buffers_.push_back(Buffer::onto_host(engine_, std::as_writable_bytes(part)));
         return buffers_.back().mem();
     }
 
     Engine engine_;
-    std::uint64_t count_;
-    Combined result_;
+    std::uint64_t begin_, count_;
+    Combined& result_;
     CombineOutput out_;
     std::vector<Buffer> buffers_;
     Buffer rows_;
 };
 
+/// A program for everything where more than estimate, error and flags is asked: else there would be too many.
 std::string program_options(const Moments::State& s, const Reading& reading) {
     const std::string groups = s.groups.size() > 1 ? "-DCLR_MANY_GROUPS" : "";
-    if (wants_more(reading.out)) return groups;
-    const auto define = [](const char* name, std::uint32_t value) {
-        return std::string(" -D") + name + "=" + std::to_string(value) + "u";
-    };
-    return groups + define("CLR_ESTIMATOR", static_cast<std::uint32_t>(reading.options.estimator)) +
-           define("CLR_ASKED", reading.asked()) + define("CLR_STATE_OPTIONS", s.all_groups().options);
+    return wants_more(reading.out) ? groups : groups + reading.program_options(s.options);
 }
 
 Event read_moments(const Moments& moments, Reading reading, std::span<const cl_event> waits) {
     auto& s = moments.state();
     if (wants_interval(reading.out) && s.options.nonfinite == NonFinite::skip)
-        reading.quantiles = quantile_table(s, reading.options);
+        reading.quantiles = quantile_table(s.engine, s.batches(), reading.options);
     Launch launch(s.engine, "combine", "clr_combine_moments", program_options(s, reading), Lanes::wide);
     s.give_planes(launch).arg(s.all_groups());
-    s.last = reading.give(launch, s, s.batches()).after(waits).after(std::array{s.last.get()}).run_ranges(s.values);
+    s.last = reading.give(launch, s.options.weights, s.batches())
+                 .after(waits)
+                 .after(std::array{s.last.get()})
+                 .run_ranges(s.values);
     return s.last;
 }
 
@@ -132,6 +170,37 @@ Event read_means(const Engine& engine, const View& m, const View& t, const View&
     Launch launch(engine, "combine", "clr_combine", "", Lanes::wide);
     launch.view(m).view(t).view(tau).view(out.estimate).arg(out.flags).arg(flag_rows).arg(zero_policy(zero));
     return launch.after(waits).run_ranges(m.count);
+}
+
+/// The batches are all there are: no state is read or kept. `rows`: CLR_TALLY_ADD counters for each work-item.
+Event read_batches(const Engine& engine, std::span<const Batch> batches, const MomentsOptions& state, Reading reading,
+                   const Buffer& rows, std::span<const cl_event> waits) {
+    if (wants_interval(reading.out) && state.nonfinite == NonFinite::skip)
+        reading.quantiles = quantile_table(engine, batches.size(), reading.options);
+    Launch launch(engine, "moments", "clr_combine_batches", "-DCLR_STATELESS" + reading.program_options(state), Lanes::wide);
+    Moments::State::Group group;
+    give_batches(launch, batches, group).arg(rows);
+    return reading.give(launch, state.weights, batches.size()).after(waits).run_ranges(batches.front().m.count);
+}
+
+/// The state that these batches would be added to.
+MomentsOptions state_for(const CombineOptions& options, const BatchOptions& batches) {
+    const Needs needs = needs_of(options.estimator);
+    if (needs.groups)
+        throw InvalidArgument("estimator",
+                              "one that needs no groups of batches; add these to Moments with .groups of 2 to 16",
+                              name_of(options.estimator));
+    return {.nonfinite = batches.nonfinite, .ratios = needs.ratios, .weights = batches.weights};
+}
+
+std::vector<std::pair<const char*, View>> views_of(std::span<const Batch> batches) {
+    std::vector<std::pair<const char*, View>> all;
+    for (const Batch& b : batches) all.insert(all.end(), {{"m", b.m}, {"t", b.t}});
+    return all;
+}
+
+Buffer rows_for_adding(const Engine& engine) {
+    return Buffer::zeroed(engine, most_work_items(engine) * CLR_TALLY_ADD * sizeof(std::uint64_t));
 }
 
 /// Whether the pass that adds can read out as well.
@@ -146,6 +215,11 @@ void check_stateless(const CombineOptions& options) {
     if (options.standard_error || options.bias || options.interval || options.gain || options.needed)
         throw InvalidArgument("standard_error", "only the estimate, for means without a history",
                               "more; add the batches to Moments");
+}
+
+void check_one_launch(std::size_t batches) {
+    if (batches == 0 || batches > CLR_BATCHES_PER_LAUNCH)
+        throw InvalidArgument("batches", "1 to " + std::to_string(CLR_BATCHES_PER_LAUNCH), std::to_string(batches));
 }
 
 void check_outputs(const CombineOutput& out) {
@@ -172,17 +246,17 @@ void check_estimator(const CombineOptions& options, const MomentsOptions& state)
                               std::to_string(options.target) + " and relative " + std::to_string(options.relative_target));
 }
 
-void Reading::check(std::uint64_t count) const {
+void Reading::check(std::uint64_t count, std::span<const std::pair<const char*, View>> inputs) const {
     check_view("tau", tau, count);
-    std::vector<std::pair<const char*, View>> outputs;
+    std::vector<std::pair<const char*, View>> others(inputs.begin(), inputs.end());
+    others.emplace_back("tau", tau);
     const auto output = [&](const char* name, const View& v) {
         if (!v.mem) return;
         check_view(name, v, count);
         if (v.stride < v.channels)
             throw InvalidArgument(name, "a stride of at least its channels", std::to_string(v.stride));
-        check_overlap(name, v, "tau", tau);
-        for (const auto& [other_name, other] : outputs) check_overlap(name, v, other_name, other);
-        outputs.emplace_back(name, v);
+        for (const auto& [other_name, other] : others) check_overlap(name, v, other_name, other);
+        others.emplace_back(name, v);
     };
     output("estimate", out.estimate);
     output("standard_error", out.standard_error);
@@ -204,7 +278,15 @@ std::uint32_t Reading::asked() const {
            bit_if(out.needed.mem, CLR_WRITE_NEEDED);
 }
 
-Launch& Reading::give(Launch& launch, const Moments::State& state, std::uint64_t added) const {
+std::string Reading::program_options(const MomentsOptions& state) const {
+    const auto define = [](const char* name, std::uint32_t value) {
+        return std::string(" -D") + name + "=" + std::to_string(value) + "u";
+    };
+    return define("CLR_ESTIMATOR", static_cast<std::uint32_t>(options.estimator)) + define("CLR_ASKED", asked()) +
+           define("CLR_STATE_OPTIONS", state_options(state));
+}
+
+Launch& Reading::give(Launch& launch, Weights weights, std::uint64_t added) const {
     device::clr_reading r{};
     r.tau = layout(tau);
     r.estimate = layout(out.estimate);
@@ -221,7 +303,7 @@ Launch& Reading::give(Launch& launch, const Moments::State& state, std::uint64_t
     r.ask.counted = options.counted;
     r.ask.target = options.target;
     r.ask.relative_target = options.relative_target;
-    r.ask.reliability = state.options.weights == Weights::reliability ? 1 : 0;
+    r.ask.reliability = weights == Weights::reliability ? 1 : 0;
     r.added = static_cast<std::uint32_t>(added);
     if (wants_interval(out)) r.quantile = static_cast<float>(quantile_for(options, added));
     r.quantiles = static_cast<std::uint32_t>(quantiles.size() / sizeof(float));
@@ -231,15 +313,26 @@ Launch& Reading::give(Launch& launch, const Moments::State& state, std::uint64_t
     return launch.arg(r);
 }
 
+FlagCounts& FlagCounts::operator+=(const FlagCounts& more) {
+    zero_denominator += more.zero_denominator;
+    zero_tau += more.zero_tau;
+    skipped += more.skipped;
+    no_data += more.no_data;
+    no_error_bar += more.no_error_bar;
+    nonfinite += more.nonfinite;
+    fell_back += more.fell_back;
+    no_spread += more.no_spread;
+    any += more.any;
+    return *this;
+}
+
 cl_event combine(const Engine& engine, View m, View t, View tau, const CombineOutput& out, CombineOptions options,
                  std::span<const cl_event> wait_list) {
     check_stateless(options);
     check_outputs(out);
     check_view("m", m, m.count);
     check_view("t", t, m.count);
-    Reading{tau, out, options}.check(m.count);
-    check_overlap("estimate", out.estimate, "m", m);
-    check_overlap("estimate", out.estimate, "t", t);
+    Reading{tau, out, options}.check(m.count, std::array{std::pair{"m", m}, std::pair{"t", t}});
     return read_means(engine, m, t, tau, out, nullptr, options.zero, wait_list).give();
 }
 
@@ -250,10 +343,12 @@ Combined combine(const Engine& engine, std::span<const float> m, std::span<const
     if (m.empty()) return {};
     const DeviceTau control = put(engine, tau, m.size());
     const Buffer mb = Buffer::from_host(engine, std::as_bytes(m)), tb = Buffer::from_host(engine, std::as_bytes(t));
-    HostOutput out(engine, m.size(), options);
+    Combined result = sized(m.size(), options, {});
+    HostOutput out(engine, result, 0, m.size());
     wait(read_means(engine, {mb.mem(), 0, m.size()}, {tb.mem(), 0, m.size()}, control.view, out.output(), out.rows(),
                     options.zero, {}));
-    return out.take();
+    out.publish();
+    return result;
 }
 
 cl_event combine(const Moments& moments, View tau, const CombineOutput& out, CombineOptions options,
@@ -267,9 +362,11 @@ cl_event combine(const Moments& moments, View tau, const CombineOutput& out, Com
 Combined combine(const Moments& moments, const Tau& tau, CombineOptions options, Combined reuse) {
     check_estimator(options, moments.options());
     const DeviceTau control = put(moments.engine(), tau, moments.size());
-    HostOutput out(moments.engine(), moments.size(), options, std::move(reuse));
+    Combined result = sized(moments.size(), options, std::move(reuse));
+    HostOutput out(moments.engine(), result, 0, moments.size());
     wait(read_moments(moments, out.reading(control.view, options), {}));
-    return out.take();
+    out.publish();
+    return result;
 }
 
 Combined add_and_combine(Moments& moments, std::span<const HostBatch> batches, const Tau& tau, CombineOptions options,
@@ -278,8 +375,10 @@ Combined add_and_combine(Moments& moments, std::span<const HostBatch> batches, c
     check_estimator(options, s.options);
     if (batches.empty()) throw InvalidArgument("batches", "at least 1", "0");
     const DeviceTau control = put(s.engine, tau, s.values);
-    const OnDevice in = put_on_device(s, batches);
-    HostOutput out(s.engine, s.values, options, std::move(reuse));
+    const OnDevice in = put_on_device(s.engine, s.values, s.options.nonfinite, batches);
+    check_room(s.batches(), batches.size());
+    Combined result = sized(s.values, options, std::move(reuse));
+    HostOutput out(s.engine, result, 0, s.values);
     const Reading reading = out.reading(control.view, options);
     const auto all = std::span<const Batch>(in.batches);
     if (fuses(s, reading)) {
@@ -290,22 +389,60 @@ Combined add_and_combine(Moments& moments, std::span<const HostBatch> batches, c
         add_batches(s, all, {});
         wait(read_moments(moments, reading, {}));
     }
-    return out.take();
+    out.publish();
+    return result;
 }
 
 cl_event add_and_combine(Moments& moments, std::span<const Batch> batches, View tau, const CombineOutput& out,
                          CombineOptions options, std::span<const cl_event> wait_list) {
     auto& s = moments.state();
     check_estimator(options, s.options);
-    if (batches.empty() || batches.size() > CLR_BATCHES_PER_LAUNCH)
-        throw InvalidArgument("batches", "1 to " + std::to_string(CLR_BATCHES_PER_LAUNCH), std::to_string(batches.size()));
-    check_batches(s, batches);
+    check_one_launch(batches.size());
+    check_batches(s.values, s.options.nonfinite, batches);
     check_room(s.batches(), batches.size());
     const Reading reading{tau, out, options};
     reading.check(s.values);
     if (fuses(s, reading)) return add_to_group(s, 0, batches, &reading, wait_list).give();
     add_batches(s, batches, wait_list);
     return read_moments(moments, reading, {}).give();
+}
+
+cl_event combine_batches(const Engine& engine, std::span<const Batch> batches, View tau, const CombineOutput& out,
+                         CombineOptions options, BatchOptions how, std::span<const cl_event> wait_list) {
+    check_one_launch(batches.size());
+    const MomentsOptions state = state_for(options, how);
+    check_estimator(options, state);
+    const std::uint64_t count = batches.front().m.count;
+    check_batches(count, state.nonfinite, batches);
+    const Reading reading{tau, out, options};
+    reading.check(count, views_of(batches));
+    return read_batches(engine, batches, state, reading, rows_for_adding(engine), wait_list).give();
+}
+
+Combined combine_batches(const Engine& engine, std::span<const HostBatch> batches, const Tau& tau, CombineOptions options,
+                         BatchOptions how) {
+    check_one_launch(batches.size());
+    const MomentsOptions state = state_for(options, how);
+    check_estimator(options, state);
+    const std::uint64_t count = batches.front().m.size();
+    for (const HostBatch& b : batches) {
+        check_size("m", b.m.size(), count);
+        check_size("t", b.t.size(), count);
+    }
+    check_tau(tau, count);
+    Combined result = sized(count, options, {});
+    const std::uint64_t most = values_in_a_part(engine, tau);
+    for (std::uint64_t begin = 0; begin < count; begin += most) {
+        const std::uint64_t size = std::min(most, count - begin);
+        const OnDevice in = put_on_device(engine, size, state.nonfinite, slices(batches, begin, size));
+        const DeviceTau control = put(engine, slice(tau, begin, size), size);
+        HostOutput out(engine, result, begin, size);
+        const Buffer rows = rows_for_adding(engine);
+        wait(read_batches(engine, in.batches, state, out.reading(control.view, options), rows, {}));
+        out.publish();
+        result.negatives += sums_of_rows<CLR_TALLY_ADD>(rows)[CLR_TALLY_NEGATIVE];
+    }
+    return result;
 }
 
 }  // namespace clratio

@@ -74,6 +74,7 @@ FileOutput::FileOutput(const fs::path& target) : Imf::OStream(target.c_str()), t
 }
 
 FileOutput::~FileOutput() {
+    if (synced_.valid()) synced_.wait();
     if (file_ >= 0) close(file_);
     if (exists_) unlink(temporary_.c_str());
     if (lock_ >= 0) close(lock_);
@@ -84,20 +85,43 @@ void FileOutput::fail(int code) {
     throw std::system_error(failure_, std::system_category());
 }
 
-void FileOutput::write(const char bytes[], int size) {
-    if (failure_ != 0) fail(failure_);
-    while (size > 0) {
-        const ssize_t done = pwrite(file_, bytes, static_cast<std::size_t>(size), static_cast<off_t>(position_));
+void FileOutput::put(std::span<const char> bytes, std::uint64_t position) {
+    while (!bytes.empty()) {
+        const ssize_t done = pwrite(file_, bytes.data(), bytes.size(), static_cast<off_t>(position));
         if (done < 0 && errno == EINTR) continue;
         if (done <= 0) fail(done < 0 ? errno : EIO);
-        bytes += done;
-        size -= static_cast<int>(done);
-        position_ += static_cast<std::uint64_t>(done);
+        bytes = bytes.subspan(static_cast<std::size_t>(done));
+        position += static_cast<std::uint64_t>(done);
     }
 }
 
+void FileOutput::flush() {
+    put(gathered_, gathered_at_);
+    gathered_.clear();
+}
+
+void FileOutput::write(const char bytes[], int size) {
+    constexpr std::size_t most = 1 << 16;
+    if (failure_ != 0) fail(failure_);
+    const std::span<const char> more(bytes, static_cast<std::size_t>(std::max(size, 0)));
+    if (position_ != gathered_at_ + gathered_.size() || gathered_.size() + more.size() > most) flush();
+    if (gathered_.empty()) gathered_at_ = position_;
+    if (more.size() > most)
+        put(more, position_);
+    else
+        gathered_.insert(gathered_.end(), more.begin(), more.end());
+    position_ += more.size();
+}
+
+void FileOutput::begin_sync() {
+    if (failure_ != 0) fail(failure_);
+    flush();
+    synced_ = std::async(std::launch::async, [file = file_] { return fsync(file) == 0 ? 0 : errno; });
+}
+
 void FileOutput::close_synced() {
-    if (failure_ == 0 && fsync(file_) != 0) failure_ = errno;
+    if (!synced_.valid()) begin_sync();
+    failure_ = synced_.get();
     if (close(std::exchange(file_, -1)) != 0 && failure_ == 0) failure_ = errno;
     if (failure_ != 0) fail(failure_);
 }

@@ -1,5 +1,7 @@
 #include "clratio/image.hpp"
 
+#include <ImfThreading.h>
+
 namespace clratio {
 namespace {
 
@@ -28,6 +30,8 @@ Image in_the_shape_of(const Image& like, std::vector<float>&& values) {
 }
 
 }  // namespace
+
+void set_image_threads(unsigned count) { Imf::setGlobalThreadCount(static_cast<int>(count)); }
 
 void require_same_shape(const Image& a, const Image& b) {
     if (a.channels != b.channels || a.data_window != b.data_window || a.display_window != b.display_window)

@@ -6,6 +6,7 @@
 
 #include "exr_file.hpp"
 #include "exr_layers.hpp"
+#include "large.hpp"
 
 namespace clratio {
 namespace {
@@ -43,8 +44,8 @@ Image read(const Source& source) {
     image.metadata = std::make_shared<Image::Metadata>(Image::Metadata{header});
 
     const auto pixels = static_cast<std::size_t>(image.width()) * static_cast<std::size_t>(image.height());
-    image.values.resize(pixels * layer.channels.size());
-    image.alpha.resize(layer.alpha ? pixels : 0);
+    resize_large(image.values, pixels * layer.channels.size());
+    resize_large(image.alpha, layer.alpha ? pixels : 0);
     std::vector<std::string> names;
     for (const auto& channel : layer.channels) names.push_back(layer.in_file(channel));
     Imf::FrameBuffer frame;

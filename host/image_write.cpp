@@ -67,8 +67,9 @@ void write(const fs::path& path, const Planes& planes, const WriteOptions& optio
         file.setFrameBuffer(planes.frame());
         file.writePixels(planes.shape.height());
     }
-    stream.close_synced();
+    stream.begin_sync();
     verify(stream.path(), planes);
+    stream.close_synced();
     stream.rename_to_target();
 }
 

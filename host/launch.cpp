@@ -7,6 +7,7 @@
 #include <cstdlib>
 
 #include "engine_state.hpp"
+#include "large.hpp"
 
 namespace clratio {
 
@@ -28,8 +29,6 @@ Memory allocate(const Engine& engine, cl_mem_flags flags, std::size_t bytes, voi
     check(code, "clCreateBuffer");
     return memory;
 }
-
-constexpr std::size_t huge_page = std::size_t{2} << 20;
 
 void CL_CALLBACK free_host(cl_mem, void* memory) { std::free(memory); }
 

@@ -1,6 +1,7 @@
 // Device memory and kernel launches; nothing else knows OpenCL's launch rules. Private to the library.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <span>
 #include <string>
@@ -50,6 +51,15 @@ std::size_t most_work_items(const Engine& engine);
 void check_view(const char* name, const View& view, std::uint64_t count);
 /// Throws InvalidArgument where an output shares elements with another view without being the same view.
 void check_overlap(const char* name, const View& output, const char* other_name, const View& other);
+
+/// The sums of counters that each work-item keeps a row of.
+template <std::size_t columns> std::array<std::uint64_t, columns> sums_of_rows(const Buffer& rows) {
+    std::vector<std::uint64_t> all(rows.size() / sizeof(std::uint64_t));
+    rows.read(std::as_writable_bytes(std::span(all)));
+    std::array<std::uint64_t, columns> sums{};
+    for (std::size_t i = 0; i < all.size(); ++i) sums[i % columns] += all[i];
+    return sums;
+}
 
 /// How many lanes a kernel has: the engine's, or two vectors in step (Engine::State::wide).
 enum class Lanes { engine, wide };

@@ -46,14 +46,9 @@ void check_weight(double weight) {
 }
 
 std::uint64_t count_nonfinite(const Engine& engine, const View& m, const View& t) {
-    const std::size_t bytes = most_work_items(engine) * sizeof(std::uint64_t);
-    const Buffer rows = Buffer::zeroed(engine, bytes);
+    const Buffer rows = Buffer::zeroed(engine, most_work_items(engine) * sizeof(std::uint64_t));
     wait(Launch(engine, "moments", "clr_scan").view(m).view(t).arg(rows).run_ranges(m.count));
-    std::vector<std::uint64_t> counts(bytes / sizeof(std::uint64_t));
-    rows.read(std::as_writable_bytes(std::span(counts)));
-    std::uint64_t sum = 0;
-    for (auto c : counts) sum += c;
-    return sum;
+    return sums_of_rows<1>(rows)[0];
 }
 
 void refuse_nonfinite(const Engine& engine, std::span<const Batch> batches) {
@@ -65,11 +60,7 @@ void refuse_nonfinite(const Engine& engine, std::span<const Batch> batches) {
 
 std::uint64_t tally(const Moments::State& s, std::size_t which) {
     wait(s.last);
-    std::vector<std::uint64_t> rows(s.add_rows.size() / sizeof(std::uint64_t));
-    s.add_rows.read(std::as_writable_bytes(std::span(rows)));
-    std::uint64_t sum = 0;
-    for (std::size_t i = which; i < rows.size(); i += CLR_TALLY_ADD) sum += rows[i];
-    return sum;
+    return sums_of_rows<CLR_TALLY_ADD>(s.add_rows)[which];
 }
 
 std::vector<cl_mem StatePlanes::*> planes_of(MomentsOptions o) {
@@ -119,11 +110,14 @@ std::uint64_t Moments::State::batches() const {
     return sum;
 }
 
+std::uint32_t state_options(const MomentsOptions& o) {
+    return (o.nonfinite == NonFinite::skip ? CLR_STATE_PER_VALUE : 0u) | (o.ratios ? CLR_STATE_RATIOS : 0u) |
+           (o.weights == Weights::reliability ? CLR_STATE_RELIABILITY : 0u);
+}
+
 device::clr_groups Moments::State::all_groups() const {
     device::clr_groups all{};
-    all.options = (options.nonfinite == NonFinite::skip ? CLR_STATE_PER_VALUE : 0u) |
-                  (options.ratios ? CLR_STATE_RATIOS : 0u) |
-                  (options.weights == Weights::reliability ? CLR_STATE_RELIABILITY : 0u);
+    all.options = state_options(options);
     all.count = options.groups;
     for (std::size_t g = 0; g < groups.size(); ++g)
         all.of[g] = {static_cast<std::uint32_t>(groups[g].batches), groups[g].weight.hi, groups[g].weight.lo,
@@ -177,22 +171,27 @@ Launch& Moments::State::give_planes(Launch& launch) const {
     return launch;
 }
 
-Event add_to_group(Moments::State& s, std::size_t group, std::span<const Batch> batches, const Reading* reading,
-                   std::span<const cl_event> waits) {
+Launch& give_batches(Launch& launch, std::span<const Batch> batches, Group& group) {
     device::clr_batches table{};
     table.count = static_cast<std::uint32_t>(batches.size());
     table.packed = std::all_of(batches.begin(), batches.end(), [](const Batch& b) { return packed(b.m) && packed(b.t); });
-    Group sum = s.groups[group];
-    Launch launch(s.engine, "moments", "clr_add", "", reading ? Lanes::wide : Lanes::engine);
     for (std::size_t k = 0; k < CLR_BATCHES_PER_LAUNCH; ++k) {
         const Batch& b = batches[std::min(k, batches.size() - 1)];
         launch.arg(b.m.mem).arg(b.t.mem);
         if (k >= batches.size()) continue;
-        table.of[k] = describe(b.m, b.t, sum, group_of(b));
-        sum = grown(sum, table.of[k], 1);
+        table.of[k] = describe(b.m, b.t, group, group_of(b));
+        group = grown(group, table.of[k], 1);
     }
-    s.give_planes(launch.arg(table)).arg(s.state_of(group)).arg(s.add_rows);
-    (reading ? *reading : Reading{}).give(launch, s, s.batches() + batches.size());
+    return launch.arg(table);
+}
+
+Event add_to_group(Moments::State& s, std::size_t group, std::span<const Batch> batches, const Reading* reading,
+                   std::span<const cl_event> waits) {
+    Group sum = s.groups[group];
+    Launch launch(s.engine, "moments", reading ? "clr_add_and_combine" : "clr_add",
+                  reading ? reading->program_options(s.options) : "", reading ? Lanes::wide : Lanes::engine);
+    s.give_planes(give_batches(launch, batches, sum)).arg(s.state_of(group)).arg(s.add_rows);
+    if (reading) reading->give(launch, s.options.weights, s.batches() + batches.size());
     s.last = launch.after(waits).after(std::array{s.last.get()}).run_ranges(s.values);
     s.groups[group] = sum;
     return s.last;
@@ -204,13 +203,13 @@ void check_room(std::uint64_t batches, std::uint64_t more) {
         throw InvalidArgument("batches", "at most 2^32 - 1 in one state", std::to_string(batches + more));
 }
 
-void check_batches(const Moments::State& s, std::span<const Batch> batches) {
-    if (s.options.nonfinite == NonFinite::fail)
-        throw InvalidArgument("NonFinite::fail", "a blocking add, which can look at the batch first", "the event form");
+void check_batches(std::uint64_t values, NonFinite nonfinite, std::span<const Batch> batches) {
+    if (nonfinite == NonFinite::fail)
+        throw InvalidArgument("NonFinite::fail", "a blocking call, which can look at the batch first", "the event form");
     for (const auto& b : batches) {
         check_weight(b.weight);
-        check_view("m", b.m, s.values);
-        check_view("t", b.t, s.values);
+        check_view("m", b.m, values);
+        check_view("t", b.t, values);
     }
 }
 
@@ -247,21 +246,20 @@ void Moments::add(std::span<const float> m, std::span<const float> t, double wei
     add(std::span(&batch, 1));
 }
 
-OnDevice put_on_device(const Moments::State& s, std::span<const HostBatch> batches) {
+OnDevice put_on_device(const Engine& engine, std::uint64_t count, NonFinite nonfinite, std::span<const HostBatch> batches) {
     OnDevice out;
     const auto put = [&](const char* name, std::span<const float> values) -> View {
-        if (values.size() != s.values)
-            throw InvalidArgument(name, std::to_string(s.values) + " values", std::to_string(values.size()));
-        out.memory.push_back(Buffer::from_host(s.engine, std::as_bytes(values)));
-        return {out.memory.back().mem(), 0, s.values};
+        if (values.size() != count)
+            throw InvalidArgument(name, std::to_string(count) + " values", std::to_string(values.size()));
+        out.memory.push_back(Buffer::from_host(engine, std::as_bytes(values)));
+        return {out.memory.back().mem(), 0, count};
     };
     for (const auto& b : batches) {
         check_weight(b.weight);
         const View m = put("m", b.m), t = put("t", b.t);
         out.batches.push_back({m, t, b.weight, b.index});
     }
-    if (s.options.nonfinite == NonFinite::fail) refuse_nonfinite(s.engine, out.batches);
-    check_room(s.batches(), batches.size());
+    if (nonfinite == NonFinite::fail) refuse_nonfinite(engine, out.batches);
     return out;
 }
 
@@ -281,14 +279,16 @@ Event add_batches(Moments::State& s, std::span<const Batch> batches, std::span<c
 }
 
 void Moments::add(std::span<const HostBatch> batches) {
-    const OnDevice put = put_on_device(*state_, batches);
-    wait(add_batches(*state_, put.batches, {}));
+    auto& s = *state_;
+    const OnDevice put = put_on_device(s.engine, s.values, s.options.nonfinite, batches);
+    check_room(s.batches(), batches.size());
+    wait(add_batches(s, put.batches, {}));
 }
 
 cl_event Moments::add(std::span<const Batch> batches, std::span<const cl_event> wait_list) {
     auto& s = *state_;
     if (batches.empty()) throw InvalidArgument("batches", "at least one", "none");
-    check_batches(s, batches);
+    check_batches(s.values, s.options.nonfinite, batches);
     check_room(s.batches(), batches.size());
     return add_batches(s, batches, wait_list).give();
 }

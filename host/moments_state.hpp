@@ -48,13 +48,16 @@ struct Reading {
     cl_mem flag_rows = nullptr;
     Buffer quantiles{};  ///< of the interval, where values differ in their number of batches
 
-    void check(std::uint64_t count) const;
+    /// Sizes of views, and overlaps of outputs with each other, tau and `inputs`.
+    void check(std::uint64_t count, std::span<const std::pair<const char*, View>> inputs = {}) const;
     std::uint32_t asked() const;  ///< CLR_WRITE and CLR_COUNT bits
-    Launch& give(Launch& launch, const Moments::State& state, std::uint64_t added) const;
+    /// Of a program for this reading of such states alone.
+    std::string program_options(const MomentsOptions& state) const;
+    Launch& give(Launch& launch, Weights weights, std::uint64_t added) const;
 };
 
 /// Weights, sizes and the nonfinite policy of batches that come as views.
-void check_batches(const Moments::State& state, std::span<const Batch> batches);
+void check_batches(std::uint64_t values, NonFinite nonfinite, std::span<const Batch> batches);
 
 /// Throws InvalidArgument where a state would hold more batches than it can count.
 void check_room(std::uint64_t batches, std::uint64_t more);
@@ -64,7 +67,12 @@ struct OnDevice {
     std::vector<Buffer> memory;
     std::vector<Batch> batches;
 };
-OnDevice put_on_device(const Moments::State& state, std::span<const HostBatch> batches);
+OnDevice put_on_device(const Engine& engine, std::uint64_t values, NonFinite nonfinite, std::span<const HostBatch> batches);
+
+/// Two arguments for each batch that a launch can take, and their clr_batches. The group grows by them.
+Launch& give_batches(Launch& launch, std::span<const Batch> batches, Moments::State::Group& group);
+
+std::uint32_t state_options(const MomentsOptions& options);  ///< CLR_STATE bits
 
 /// Adds 1 to 8 batches to one group in one launch, and reads out in the same pass where asked.
 Event add_to_group(Moments::State& state, std::size_t group, std::span<const Batch> batches, const Reading* reading,

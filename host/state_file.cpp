@@ -304,8 +304,9 @@ void write(const fs::path& path, const StateFile& state) {
         file.setFrameBuffer(frame_of(state, rows, box_of(state.shape.data_window)));
         file.writePixels(state.shape.height());
     }
-    stream.close_synced();
+    stream.begin_sync();
     verify(stream.path(), state, sum.sum());
+    stream.close_synced();
     stream.rename_to_target();
 }
 

@@ -1,4 +1,5 @@
-// Adds batches to a state of moments, reads out in the same pass where asked; merges states; scans for non-finite input.
+// Adds batches to a state of moments; merges states; scans for non-finite input. A program with CLR_ASKED adds and reads
+// out in one pass: CLR_ESTIMATOR and those outputs, of states of CLR_STATE_OPTIONS, or with CLR_STATELESS of none.
 #include "clratio/device/planes.h"
 
 #define CLR_EACH_BATCH(X) X(0) X(1) X(2) X(3) X(4) X(5) X(6) X(7)
@@ -15,10 +16,17 @@ CLR_FN clr_entry clr_entry_of(const clr_batch* batch) {
     return e;
 }
 
-// The inputs of one launch.
+// What a work-item adds, and what it counts.
 typedef struct {
     global const float *m[CLR_BATCHES_PER_LAUNCH], *t[CLR_BATCHES_PER_LAUNCH];
-} clr_inputs;
+    const clr_batches* batches;
+    clr_planes planes;
+    clr_state state;
+    ulong count;
+    clr_uint negative, skipped;
+} clr_adder;
+
+CLR_FN bool clr_skips(const clr_adder* a) { return (a->state.options & CLR_STATE_PER_VALUE) != 0; }
 
 // A block of vectors stays in the first cache while the batches go over it one by one: neighbours do not wait for each
 // other, and few streams run through memory at a time. GPUs keep one vector in registers.
@@ -34,152 +42,274 @@ typedef struct {
     clr_moments moments[CLR_BLOCK];
 } clr_block;
 
+// 1 where a batch was left out before this launch.
 CLR_FN clr_real clr_lost_before(clr_planes planes, clr_state s, ulong i) {
     if (!(s.options & CLR_STATE_PER_VALUE)) return (clr_real)(0.0f);
     return clr_load_batches(planes, s, i) == (clr_uint)(s.group.batches) ? (clr_real)(0.0f) : (clr_real)(1.0f);
 }
 
-CLR_FN clr_real clr_lesser(clr_real a, clr_real b) { return a < b ? a : b; }
-
-// 0 where no batch was left out before, and none has made a mean infinite or NaN.
-CLR_FN clr_real clr_doubt(clr_moments s, clr_real lost) {
+// Whether some value has lost a batch, or a mean is infinite or NaN, which tells that a batch was.
+CLR_FN bool clr_in_doubt(clr_moments s, clr_real lost) {
     const clr_real zero = (clr_real)(0.0f);
-    return clr_fma(s.m.hi, zero, clr_fma(s.t.hi, zero, lost));
+    return clr_any(clr_fma(s.m.hi, zero, clr_fma(s.t.hi, zero, lost)) != zero);
 }
 
-// Batch k over a block of whole vectors of contiguous values. The first pass takes the state from the planes, the last one
-// puts it back, save for vectors in doubt: those it returns, a bit each, untouched.
-CLR_FN uint clr_pass(const bool is_first, const bool is_last, uint k, const clr_inputs* in, const clr_batches* batches,
-                     clr_block* block, clr_planes planes, clr_state s, ulong first, clr_real* least) {
-    const clr_batch batch = batches->of[k];
-    global const float* m_from = in->m[k] + batch.m.offset + first;
-    global const float* t_from = in->t[k] + batch.t.offset + first;
-    const bool skips = s.options & CLR_STATE_PER_VALUE;
+CLR_FN clr_real clr_lesser(clr_real a, clr_real b) { return a < b ? a : b; }
+
+CLR_FN clr_state clr_grown(const clr_adder* a) {
+    const clr_batch last = a->batches->of[a->batches->count - 1];
+    const clr_group group = {a->state.group.batches + a->batches->count, last.sum_hi, last.sum_lo, last.sum2_hi,
+                             last.sum2_lo};
+    clr_state grown = a->state;
+    grown.group = group;
+    return grown;
+}
+
+// Of a vector whose values all have the same evidence.
+CLR_FN void clr_put_back(clr_moments moments, const clr_adder* a, ulong at) {
+    clr_store_moments(moments, a->planes, a->state, at);
+    if (!clr_skips(a)) return;
+    const clr_group g = clr_grown(a).group;
+    clr_store_evidence(clr_both(g.weight_hi, g.weight_lo), clr_both(g.weight2_hi, g.weight2_lo), (clr_uint)(g.batches),
+                       a->planes, a->state, at);
+}
+
+CLR_FN clr_moments clr_no_moments(void) {
+    clr_moments s;
+    s.m = s.t = s.mm = s.tt = s.mt = clr_both(0.0f, 0.0f);
+    return s;
+}
+
+// Batch k over a block of whole vectors of contiguous values. The first pass takes the state from the planes. The last one
+// puts it back, save for vectors in doubt, of which it gives a bit each.
+CLR_FN uint clr_pass(const bool is_first, const bool is_last, uint k, clr_block* block, const clr_adder* a, ulong first,
+                     clr_real* least) {
+    const clr_batch batch = a->batches->of[k];
+    global const float* m_from = a->m[k] + batch.m.offset + first;
+    global const float* t_from = a->t[k] + batch.t.offset + first;
     const clr_entry e = clr_entry_of(&batch);
+    const uint index = a->state.group.batches + k;
     clr_real low = *least;
     uint doubtful = 0;
     for (uint v = 0; v < CLR_BLOCK; ++v) {
         const ulong at = first + v * CLR_WIDTH;
         const clr_real m = clr_load(m_from + v * CLR_WIDTH), t = clr_load(t_from + v * CLR_WIDTH);
-        const clr_moments moments =
-            clr_moments_add(is_first ? clr_load_moments(planes, s, at) : block->moments[v], m, t, e, s.group.batches + k);
+        const clr_moments before = is_first ? clr_load_moments(a->planes, a->state, at) : block->moments[v];
+        const clr_moments moments = clr_moments_add(before, m, t, e, index);
         low = clr_lesser(m, clr_lesser(t, low));
-        if (!is_last) {
+        if (!is_last)
             block->moments[v] = moments;
-        } else if (skips && clr_any(clr_doubt(moments, clr_lost_before(planes, s, at)) != (clr_real)(0.0f))) {
+        else if (clr_skips(a) && clr_in_doubt(moments, clr_lost_before(a->planes, a->state, at)))
             doubtful |= 1u << v;
-        } else {
-            clr_store_moments(moments, planes, s, at);
-            if (skips)
-                clr_store_evidence(clr_both(batch.sum_hi, batch.sum_lo), clr_both(batch.sum2_hi, batch.sum2_lo),
-                                   (clr_uint)(s.group.batches + batches->count), planes, s, at);
-        }
+        else
+            clr_put_back(moments, a, at);
     }
     *least = low;
     return doubtful;
 }
 
-CLR_FN clr_uint clr_count_negative(const clr_inputs* in, const clr_batches* batches, ulong first) {
+CLR_FN void clr_count_negative(clr_adder* a, ulong first) {
     const clr_real zero = (clr_real)(0.0f);
-    clr_uint negative = (clr_uint)(0u);
-    for (uint k = 0; k < batches->count; ++k) {
-        global const float* m_from = in->m[k] + batches->of[k].m.offset + first;
-        global const float* t_from = in->t[k] + batches->of[k].t.offset + first;
+    for (uint k = 0; k < a->batches->count; ++k) {
+        global const float* m_from = a->m[k] + a->batches->of[k].m.offset + first;
+        global const float* t_from = a->t[k] + a->batches->of[k].t.offset + first;
         for (uint v = 0; v < CLR_BLOCK; ++v)
-            negative += clr_one_where(clr_load(m_from + v * CLR_WIDTH) < zero) +
-                        clr_one_where(clr_load(t_from + v * CLR_WIDTH) < zero);
+            a->negative += clr_one_where(clr_load(m_from + v * CLR_WIDTH) < zero) +
+                           clr_one_where(clr_load(t_from + v * CLR_WIDTH) < zero);
     }
-    return negative;
 }
 
-CLR_FN uint clr_add_block(const clr_inputs* in, const clr_batches* batches, clr_planes planes, clr_state s, ulong first,
-                          clr_uint* negative) {
+// A bit for each vector that is left to clr_add_vector.
+CLR_FN uint clr_add_block(clr_adder* a, ulong first) {
     clr_block block;
     clr_real least = (clr_real)(0.0f);
     uint doubtful;
-    const uint last = batches->count - 1;
+    const uint last = a->batches->count - 1;
     if (last == 0) {
-        doubtful = clr_pass(true, true, 0, in, batches, &block, planes, s, first, &least);
+        doubtful = clr_pass(true, true, 0, &block, a, first, &least);
     } else {
-        clr_pass(true, false, 0, in, batches, &block, planes, s, first, &least);
-        for (uint k = 1; k < last; ++k) clr_pass(false, false, k, in, batches, &block, planes, s, first, &least);
-        doubtful = clr_pass(false, true, last, in, batches, &block, planes, s, first, &least);
+        clr_pass(true, false, 0, &block, a, first, &least);
+        for (uint k = 1; k < last; ++k) clr_pass(false, false, k, &block, a, first, &least);
+        doubtful = clr_pass(false, true, last, &block, a, first, &least);
     }
-    if (clr_any(least < (clr_real)(0.0f))) *negative += clr_count_negative(in, batches, first);
+    if (clr_any(least < (clr_real)(0.0f))) clr_count_negative(a, first);
+    return doubtful;
+}
+
+// The same for a block that stays. Of no state it is one pass over and over: a small program is loaded sooner.
+CLR_FN uint clr_fill_block(const bool keeps, clr_block* block, clr_adder* a, ulong first) {
+    clr_real least = (clr_real)(0.0f);
+    if (keeps)
+        clr_pass(true, false, 0, block, a, first, &least);
+    else
+        for (uint v = 0; v < CLR_BLOCK; ++v) block->moments[v] = clr_no_moments();
+    for (uint k = keeps ? 1 : 0; k < a->batches->count; ++k) clr_pass(false, false, k, block, a, first, &least);
+    if (clr_any(least < (clr_real)(0.0f))) clr_count_negative(a, first);
+    uint doubtful = 0;
+    for (uint v = 0; clr_skips(a) && v < CLR_BLOCK; ++v) {
+        const clr_real lost = keeps ? clr_lost_before(a->planes, a->state, first + v * CLR_WIDTH) : (clr_real)(0.0f);
+        doubtful |= clr_in_doubt(block->moments[v], lost) ? 1u << v : 0u;
+    }
     return doubtful;
 }
 
 // Any vector: each value has a share of its own in each batch.
-CLR_FN void clr_add_vector(const clr_inputs* in, const clr_batches* batches, clr_planes planes, clr_state s, ulong first,
-                           ulong count, clr_uint* negative, clr_uint* skipped) {
+CLR_FN clr_record clr_add_vector(clr_adder* a, ulong first, const bool count_negative) {
     const clr_real zero = (clr_real)(0.0f);
-    const bool skips = s.options & CLR_STATE_PER_VALUE;
-    clr_record r = clr_load_record(planes, s, first);
-    for (uint k = 0; k < batches->count; ++k) {
-        const clr_batch batch = batches->of[k];
-        const clr_real m = clr_load_view(in->m[k], batch.m, first, count);
-        const clr_real t = clr_load_view(in->t[k], batch.t, first, count);
-        const clr_mask bad = skips ? !(clr_is_finite(m) && clr_is_finite(t)) : zero != zero;
+    clr_record r = clr_load_record(a->planes, a->state, first);
+    for (uint k = 0; k < a->batches->count; ++k) {
+        const clr_batch batch = a->batches->of[k];
+        const clr_real m = clr_load_view(a->m[k], batch.m, first, a->count);
+        const clr_real t = clr_load_view(a->t[k], batch.t, first, a->count);
+        const clr_mask bad = clr_skips(a) ? !(clr_is_finite(m) && clr_is_finite(t)) : zero != zero;
         const clr_two added =
             clr_two_make(bad ? zero : (clr_real)(batch.weight_hi), bad ? zero : (clr_real)(batch.weight_lo));
         const clr_two sum = clr_two_add(r.weight, added);
         const clr_entry e = clr_entry_make(r.weight, added, sum);
-        r.moments = clr_moments_add(r.moments, bad ? zero : m, bad ? zero : t, e, s.group.batches + k);
-        if (s.options & CLR_STATE_RATIOS) r.ratios = clr_ratios_add(r.ratios, bad ? zero : m, bad ? zero : t, e);
+        r.moments = clr_moments_add(r.moments, bad ? zero : m, bad ? zero : t, e, a->state.group.batches + k);
+        if (a->state.options & CLR_STATE_RATIOS) r.ratios = clr_ratios_add(r.ratios, bad ? zero : m, bad ? zero : t, e);
         r.weight = sum;
-        if (s.options & CLR_STATE_RELIABILITY) r.weight2 = clr_two_add(r.weight2, clr_two_square(added));
+        if (a->state.options & CLR_STATE_RELIABILITY) r.weight2 = clr_two_add(r.weight2, clr_two_square(added));
         r.batches += clr_one_where(!bad);
-        *negative += clr_one_where(m < zero) + clr_one_where(t < zero);
-        *skipped += clr_one_where(bad);
+        if (count_negative) a->negative += clr_one_where(m < zero) + clr_one_where(t < zero);
+        a->skipped += clr_one_where(bad);
     }
-    clr_store_record(r, planes, s, first);
+    return r;
 }
 
-kernel void clr_add(CLR_EACH_BATCH(CLR_BATCH_ARGUMENTS) clr_batches batches, CLR_PLANE_ARGUMENTS(s), clr_state s_state,
-                    global ulong* add_rows, CLR_READING_ARGUMENTS, clr_range range) {
-    const clr_inputs in = {{CLR_EACH_BATCH(CLR_M)}, {CLR_EACH_BATCH(CLR_T)}};
-    const clr_planes planes = CLR_PLANES(s);
-    const clr_outputs to = CLR_OUTPUTS;
-    clr_question ask = reading.ask;
-    ask.estimator = min(ask.estimator, CLR_ESTIMATOR_MEAN_OF_RATIOS);
-    ask.outputs &= CLR_WRITE_ESTIMATE | CLR_WRITE_ERROR | CLR_WRITE_FLAGS | CLR_COUNT_FLAGS;
-    const bool plain = batches.packed && !(s_state.options & CLR_STATE_RATIOS);
-    const clr_batch last = batches.of[batches.count - 1];
-    const clr_group grown = {s_state.group.batches + batches.count, last.sum_hi, last.sum_lo, last.sum2_hi, last.sum2_lo};
-    clr_state after = s_state;
-    after.group = grown;
-    const bool skips = s_state.options & CLR_STATE_PER_VALUE;
-    const clr_evidence whole = clr_evidence_of_group(grown, ask.reliability);
-    clr_uint negative = (clr_uint)(0u), skipped = (clr_uint)(0u);
-    clr_flag_tally tally = {{(clr_uint)(0u)}};
+CLR_FN clr_adder clr_adder_make(const clr_batches* batches, clr_planes planes, clr_state s, ulong count) {
+    clr_adder a;
+    a.batches = batches;
+    a.planes = planes;
+    a.state = s;
+    a.count = count;
+    a.negative = a.skipped = (clr_uint)(0u);
+    return a;
+}
+#define CLR_TAKE_INPUT(k)                                                                                                   \
+    a.m[k] = m##k;                                                                                                          \
+    a.t[k] = t##k;
 
-    const clr_span span = clr_my_span(range);
+CLR_FN bool clr_is_block(const clr_adder* a, ulong v, clr_span span) {
+    return a->batches->packed && !(a->state.options & CLR_STATE_RATIOS) && v + CLR_BLOCK <= span.end &&
+           (v + CLR_BLOCK) * CLR_WIDTH <= a->count;
+}
+
+CLR_FN void clr_store_add_tally(const clr_adder* a, global ulong* rows) {
+    rows += get_global_id(0) * CLR_TALLY_ADD;
+    rows[CLR_TALLY_NEGATIVE] += clr_sum_lanes(a->negative);
+    rows[CLR_TALLY_SKIPPED] += clr_sum_lanes(a->skipped);
+}
+
+#if defined(CLR_ASKED)
+
+typedef struct {
+    clr_reading reading;
+    global const float *tau, *quantiles;
+    clr_outputs to;
+    clr_evidence whole;  // of a value that has lost no batch
+    clr_flag_tally tally;
+} clr_reader;
+
+// As clr_combine_moments reads it out of the planes.
+CLR_FN void clr_read_record(clr_record r, clr_evidence n, clr_reader* reader, ulong first, ulong count) {
+    clr_question ask = reader->reading.ask;
+    ask.estimator = CLR_ESTIMATOR;
+    ask.outputs = CLR_ASKED;
+    const clr_real control = clr_load_view(reader->tau, reader->reading.tau, first, count);
+    r.moments = clr_moments_settle(r.moments);
+    const clr_quotient q = clr_divide_means(r.moments.m, r.moments.t, control, ask.zero_policy);
+    const clr_estimate e =
+        clr_read_out(r, q, clr_residual_of(r.moments, q.quotient), n, clr_folds_begin(), reader->reading.added, control,
+                     clr_quantile_for(r.batches, reader->reading, reader->quantiles), ask);
+    clr_write_reading(e, reader->reading, ask.outputs, reader->to, &reader->tally, first, count);
+}
+
+CLR_FN void clr_add_and_read(const bool keeps, clr_adder* a, clr_reader* reader, clr_span span) {
+    const clr_state grown = clr_grown(a);
+    clr_record whole;
+    whole.weight = clr_both(grown.group.weight_hi, grown.group.weight_lo);
+    whole.weight2 = clr_both(grown.group.weight2_hi, grown.group.weight2_lo);
+    whole.batches = (clr_uint)(grown.group.batches);
+    whole.ratios.quotient = whole.ratios.zero_m = whole.ratios.zero_share = clr_both(0.0f, 0.0f);
     for (ulong v = span.begin; v < span.end;) {
-        const ulong first = v * CLR_WIDTH;
-        const bool in_block = plain && v + CLR_BLOCK <= span.end && first + CLR_BLOCK * CLR_WIDTH <= range.count;
+        const bool in_block = clr_is_block(a, v, span);
         const ulong done = in_block ? CLR_BLOCK : 1;
-        clr_uint counted = (clr_uint)(0u);
-        uint left = in_block ? clr_add_block(&in, &batches, planes, s_state, first, &negative) : 1u;
-        for (ulong at = first; left; left >>= 1, at += CLR_WIDTH)
-            if (left & 1u)
-                clr_add_vector(&in, &batches, planes, s_state, at, range.count, in_block ? &counted : &negative, &skipped);
-        if (ask.outputs)
-            for (ulong k = 0; k < done; ++k) {
-                const ulong at = first + k * CLR_WIDTH;
-                const clr_real control = clr_load_view(tau, reading.tau, at, range.count);
-                clr_record r = clr_load_record(planes, after, at);
-                r.moments = clr_moments_settle(r.moments);
-                const clr_quotient q = clr_divide_means(r.moments.m, r.moments.t, control, ask.zero_policy);
-                const clr_evidence n = skips ? clr_evidence_of(r.batches, r.weight, r.weight2, ask.reliability) : whole;
-                const clr_estimate e = clr_read_out(r, q, clr_residual_of(r.moments, q.quotient), n, clr_folds_begin(),
-                                                    reading.added, control, (clr_real)(0.0f), ask);
-                clr_write_reading(e, reading, ask.outputs, to, &tally, at, range.count);
+        clr_block block;
+        const uint alone = in_block ? clr_fill_block(keeps, &block, a, v * CLR_WIDTH) : 1u;
+        for (uint k = 0; k < done; ++k) {
+            const ulong at = (v + k) * CLR_WIDTH;
+            clr_record r = whole;
+            clr_evidence n = reader->whole;
+            if (alone >> k & 1u) {
+                r = clr_add_vector(a, at, !in_block);
+                if (keeps) clr_store_record(r, a->planes, a->state, at);
+                if (clr_skips(a)) n = clr_evidence_of(r.batches, r.weight, r.weight2, reader->reading.ask.reliability);
+            } else {
+                r.moments = block.moments[k];
+                if (keeps) clr_put_back(r.moments, a, at);
             }
+            clr_read_record(r, n, reader, at, a->count);
+        }
         v += done * span.step;
     }
-    add_rows[get_global_id(0) * CLR_TALLY_ADD + CLR_TALLY_NEGATIVE] += clr_sum_lanes(negative);
-    add_rows[get_global_id(0) * CLR_TALLY_ADD + CLR_TALLY_SKIPPED] += clr_sum_lanes(skipped);
-    if (ask.outputs) clr_store_flag_tally(&tally, flag_rows);
+}
+
+#define CLR_MAKE_READER(a)                                                                                                  \
+    clr_reader reader = {reading,                                                                                           \
+                         tau,                                                                                               \
+                         quantiles,                                                                                         \
+                         CLR_OUTPUTS,                                                                                       \
+                         clr_evidence_of_group(clr_grown(&a).group, reading.ask.reliability),                               \
+                         {{(clr_uint)(0u)}}};
+
+#if !defined(CLR_STATELESS)
+
+kernel void clr_add_and_combine(CLR_EACH_BATCH(CLR_BATCH_ARGUMENTS) clr_batches batches, CLR_PLANE_ARGUMENTS(s),
+                                clr_state s_state, global ulong* add_rows, CLR_READING_ARGUMENTS, clr_range range) {
+    const clr_planes planes = CLR_PLANES(s);
+    s_state.options = CLR_STATE_OPTIONS;
+    clr_adder a = clr_adder_make(&batches, planes, s_state, range.count);
+    CLR_EACH_BATCH(CLR_TAKE_INPUT)
+    CLR_MAKE_READER(a)
+    clr_add_and_read(true, &a, &reader, clr_my_span(range));
+    clr_store_add_tally(&a, add_rows);
+    clr_store_flag_tally(&reader.tally, flag_rows);
+}
+
+#else
+
+// The batches are all there are.
+kernel void clr_combine_batches(CLR_EACH_BATCH(CLR_BATCH_ARGUMENTS) clr_batches batches, global ulong* add_rows,
+                                CLR_READING_ARGUMENTS, clr_range range) {
+    const clr_planes none = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+    const clr_state empty = {0, 1, {0, 0.0f, 0.0f, 0.0f, 0.0f}, CLR_STATE_OPTIONS};
+    clr_adder a = clr_adder_make(&batches, none, empty, range.count);
+    CLR_EACH_BATCH(CLR_TAKE_INPUT)
+    CLR_MAKE_READER(a)
+    clr_add_and_read(false, &a, &reader, clr_my_span(range));
+    clr_store_add_tally(&a, add_rows);
+    clr_store_flag_tally(&reader.tally, flag_rows);
+}
+
+#endif
+
+#else
+
+kernel void clr_add(CLR_EACH_BATCH(CLR_BATCH_ARGUMENTS) clr_batches batches, CLR_PLANE_ARGUMENTS(s), clr_state s_state,
+                    global ulong* add_rows, clr_range range) {
+    const clr_planes planes = CLR_PLANES(s);
+    clr_adder a = clr_adder_make(&batches, planes, s_state, range.count);
+    CLR_EACH_BATCH(CLR_TAKE_INPUT)
+    const clr_span span = clr_my_span(range);
+    for (ulong v = span.begin; v < span.end;) {
+        const bool in_block = clr_is_block(&a, v, span);
+        uint alone = in_block ? clr_add_block(&a, v * CLR_WIDTH) : 1u;
+        for (ulong at = v * CLR_WIDTH; alone; alone >>= 1, at += CLR_WIDTH)
+            if (alone & 1u) clr_store_record(clr_add_vector(&a, at, !in_block), planes, s_state, at);
+        v += (in_block ? CLR_BLOCK : 1) * span.step;
+    }
+    clr_store_add_tally(&a, add_rows);
 }
 
 // entry: how b enters a for values that skipped nothing on either side; row_words of counters are added too.
@@ -223,3 +353,5 @@ kernel void clr_scan(global const float* m, clr_layout m_layout, global const fl
     }
     rows[get_global_id(0)] = clr_sum_lanes(bad);
 }
+
+#endif

@@ -39,6 +39,7 @@ struct FlagCounts {
                   fell_back = 0, no_spread = 0;
     std::uint64_t any = 0;  ///< values with at least one of those in CombineOptions::counted
     std::uint64_t total() const { return any; }
+    FlagCounts& operator+=(const FlagCounts& more);
 };
 
 /// Empty where not asked for.
@@ -52,6 +53,7 @@ struct Combined {
     std::vector<std::uint32_t> kind;  ///< IntervalKind of each value
     std::vector<float> gain;          ///< 1 where m does not vary
     std::vector<float> needed;        ///< 0: the target is met; +inf where nothing is known
+    std::uint64_t negatives = 0;      ///< negative inputs that combine_batches has read
 };
 
 /// tau: one number, one for each of `channels` interleaved channels, or one for each value.
@@ -67,8 +69,8 @@ struct Tau {
 
 /// Device views of a read-out; null members are not written. Flags: uint32, contiguous.
 struct CombineOutput {
-    View estimate;
-    View standard_error;
+    View estimate{};
+    View standard_error{};
     cl_mem flags = nullptr;
     View bias{}, lower{}, upper{}, gain{}, needed{};
     cl_mem kind = nullptr;  ///< uint32, contiguous
@@ -102,5 +104,19 @@ Combined add_and_combine(Moments& moments, std::span<const HostBatch> batches, c
 /// At most 8 batches.
 cl_event add_and_combine(Moments& moments, std::span<const Batch> batches, View tau, const CombineOutput& out,
                          CombineOptions options = {}, std::span<const cl_event> wait_list = {});
+
+struct BatchOptions {
+    NonFinite nonfinite = NonFinite::skip;  ///< fail: blocking calls only
+    Weights weights = Weights::samples;
+};
+
+/// 1 to 8 batches that are all there are: what they give when added to new Moments and read out, the same bits, in one pass
+/// that keeps no state. Shapes, policies, errors: those of Moments::add and of combine(Moments). Estimators: all but those
+/// over groups. Cost: 8 bytes a value and batch, tau, and what is written.
+cl_event combine_batches(const Engine& engine, std::span<const Batch> batches, View tau, const CombineOutput& out,
+                         CombineOptions options = {}, BatchOptions how = {}, std::span<const cl_event> wait_list = {});
+/// Of any size: what does not fit into one allocation of the device is done in parts.
+Combined combine_batches(const Engine& engine, std::span<const HostBatch> batches, const Tau& tau,
+                         CombineOptions options = {}, BatchOptions how = {});
 
 }  // namespace clratio

@@ -67,6 +67,10 @@ void write_image(const std::filesystem::path& path, const Image& image, const Wr
 void write_flags(const std::filesystem::path& path, const Image& like, std::span<const std::uint32_t> flags,
                  const WriteOptions& options = {});
 
+/// From now on images are compressed and decompressed on so many threads of OpenEXR's own pool, which the whole process
+/// shares; 0, as it starts, on the caller's thread. Changes no byte of any file.
+void set_image_threads(unsigned count);
+
 /// Throws InvalidArgument naming both files where windows or channels differ.
 void require_same_shape(const Image& a, const Image& b);
 

@@ -21,6 +21,7 @@ namespace clratio::test {
 struct Said {
     int code = -1;  ///< exit code, or 128 + signal
     std::string out, err;
+    bool killed = false;  ///< by a signal that it did not handle
 };
 
 struct Surroundings {
@@ -56,7 +57,7 @@ inline Said run(const std::string& program, const std::vector<std::string>& argu
     int status = 0;
     waitpid(child, &status, 0);
     return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), around.out.empty() ? bytes_of(out) : "",
-            bytes_of(err)};
+            bytes_of(err), WIFSIGNALED(status)};
 }
 
 }  // namespace clratio::test

@@ -38,4 +38,12 @@ inline std::vector<Shape> some_shapes() {
             {"groups of 3", {.width = 1, .path = Path::groups, .work_items = 3}}};
 }
 
+/// Both paths and the ends of the widths, for kernels that take longer still.
+inline std::vector<Shape> fewest_shapes() {
+    using Path = EngineOptions::Path;
+    return {{"ranges, width 1", {.width = 1, .path = Path::ranges}},
+            {"groups, width 4", {.width = 4, .path = Path::groups}},
+            {"ranges, width 16", {.width = 16, .path = Path::ranges}}};
+}
+
 }  // namespace clratio::test

@@ -42,15 +42,7 @@ void append(Combined& to, const Combined& more) {
     append(to.gain, more.gain);
     append(to.needed, more.needed);
     append(to.flag_image, more.flag_image);
-    to.flags.zero_denominator += more.flags.zero_denominator;
-    to.flags.zero_tau += more.flags.zero_tau;
-    to.flags.skipped += more.flags.skipped;
-    to.flags.no_data += more.flags.no_data;
-    to.flags.no_error_bar += more.flags.no_error_bar;
-    to.flags.nonfinite += more.flags.nonfinite;
-    to.flags.fell_back += more.flags.fell_back;
-    to.flags.no_spread += more.flags.no_spread;
-    to.flags.any += more.flags.any;
+    to.flags += more.flags;
 }
 
 CombineOptions plain_mean(const CombineOptions& options) {
@@ -96,43 +88,29 @@ void Bands::add(std::span<const HostBatch> batches) {
     }
 }
 
-template <class Read> ReadOut Bands::read(Read read_band, const Tau& tau, const Wanted& wanted) const {
+ReadOut Bands::read_out(const Tau& tau, const Wanted& wanted) const {
     ReadOut out;
     Combined chosen, mean;
     for (std::uint64_t band = 0; band < bands(); ++band) {
         const Tau part = slice(tau, begin(band), size(band));
-        const Moments& moments = read_band(band, part, chosen);
+        chosen = clratio::combine(states_[band], part, wanted.options, std::move(chosen));
         reserve(out.chosen, chosen, values_);
         append(out.chosen, chosen);
         if (wanted.mean) {
-            mean = clratio::combine(moments, part, plain_mean(wanted.options), std::move(mean));
+            mean = clratio::combine(states_[band], part, plain_mean(wanted.options), std::move(mean));
             reserve(out.mean, mean, values_);
             append(out.mean, mean);
         }
-        out.negatives += moments.negatives();
+        out.chosen.negatives += states_[band].negatives();
     }
     return out;
 }
 
-ReadOut Bands::read_out(const Tau& tau, const Wanted& wanted) const {
-    const auto read_band = [&](std::uint64_t band, const Tau& part, Combined& read) -> const Moments& {
-        read = clratio::combine(states_[band], part, wanted.options, std::move(read));
-        return states_[band];
-    };
-    return read(read_band, tau, wanted);
-}
-
-ReadOut Bands::at_once(std::span<const HostBatch> batches, const Tau& tau, const Wanted& wanted) const {
-    Moments moments = make(0);
-    const auto read_band = [&](std::uint64_t band, const Tau& part, Combined& read) -> const Moments& {
-        if (moments.size() == size(band))
-            moments.clear();
-        else
-            moments = make(band);
-        read = clratio::add_and_combine(moments, slices(band, batches), part, wanted.options, std::move(read));
-        return moments;
-    };
-    return read(read_band, tau, wanted);
+ReadOut read_at_once(const clratio::Engine& engine, std::span<const HostBatch> batches, const Tau& tau,
+                     const Wanted& wanted, const clratio::BatchOptions& how) {
+    ReadOut out{clratio::combine_batches(engine, batches, tau, wanted.options, how), {}};
+    if (wanted.mean) out.mean = clratio::combine_batches(engine, batches, tau, plain_mean(wanted.options), how);
+    return out;
 }
 
 }  // namespace tool

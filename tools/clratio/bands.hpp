@@ -1,5 +1,4 @@
-// The moments of an image in bands of values. A band's state stays in the processor's cache between adding and reading
-// out, and where all batches are at hand there is never more than one: of 3840x2160 RGB and 2 batches, .4 s instead of 2.
+// Images read out of batches: through moments, in bands of values that fit the device and its caches, or at once.
 #pragma once
 
 #include <optional>
@@ -17,8 +16,11 @@ struct Wanted {
 
 struct ReadOut {
     clratio::Combined chosen, mean;
-    std::uint64_t negatives = 0;
 };
+
+/// Of 1 to 8 batches that are all there are, without moments: the same bits.
+ReadOut read_at_once(const clratio::Engine& engine, std::span<const clratio::HostBatch> batches, const clratio::Tau& tau,
+                     const Wanted& wanted, const clratio::BatchOptions& how);
 
 class Bands {
 public:
@@ -32,8 +34,6 @@ public:
     ReadOut read_out(const clratio::Tau& tau, const Wanted& wanted) const;
     /// What was added, as one state of the whole image.
     clratio::Snapshot snapshot() const;
-    /// Of these batches alone, the same bits as adding them; keeps no state.
-    ReadOut at_once(std::span<const clratio::HostBatch> batches, const clratio::Tau& tau, const Wanted& wanted) const;
 
 private:
     std::uint64_t bands() const { return (values_ + band_ - 1) / band_; }
@@ -41,7 +41,6 @@ private:
     std::uint64_t size(std::uint64_t band) const { return std::min(band_, values_ - begin(band)); }
     clratio::Moments make(std::uint64_t band) const { return {engine_, size(band), options_}; }
     std::vector<clratio::HostBatch> slices(std::uint64_t band, std::span<const clratio::HostBatch> batches) const;
-    template <class Read> ReadOut read(Read read_band, const clratio::Tau& tau, const Wanted& wanted) const;
 
     clratio::Engine engine_;
     std::uint64_t values_, band_;  ///< band_: a multiple of the channels, so that each band starts with the first

@@ -26,8 +26,8 @@ int combine_without_state(const Options& options) {
     PairReader reader(jobs_of(options), options.layer);  // before the device is opened, which takes as long
     CombineRun run(options);
     auto pairs = reader.next();
-    if (reader.done()) {
-        run.add_and_read_out(pairs);
+    if (reader.done() && !run.has_groups()) {
+        run.read_out_at_once(pairs);
         return run.report(reader.seconds());
     }
     ProgressLine line;

@@ -29,6 +29,14 @@ std::optional<float> number(const std::string& text) {
     return value;
 }
 
+std::vector<float> numbers(const std::vector<std::string>& words) {
+    std::vector<float> all;
+    for (const auto& text : words)
+        if (const auto value = number(text)) all.push_back(*value);
+    if (!all.empty() && all.size() != words.size()) throw UsageError("--tau: either numbers or files, not both");
+    return all;
+}
+
 }  // namespace
 
 std::size_t memory_budget() {
@@ -73,30 +81,29 @@ void require_finite(const clratio::Image& image) {
     }
 }
 
-clratio::Image read_like(const clratio::Image& shape, const std::string& file, const std::string& layer) {
-    auto image = clratio::read_image(file, layer);
+SideReader::SideReader(std::vector<std::string> files, const std::string& layer) : images_(std::move(files), layer, 0, 1) {}
+
+clratio::Image SideReader::next_like(const clratio::Image& shape) {
+    auto image = images_.next();
     clratio::require_same_shape(shape, image);
     return image;
 }
 
-TauInput::TauInput(const std::vector<std::string>& words) {
-    for (const auto& text : words)
-        if (const auto value = number(text)) numbers_.push_back(*value);
-    if (!numbers_.empty() && numbers_.size() != words.size()) throw UsageError("--tau: either numbers or files, not both");
-}
+TauInput::TauInput(const std::vector<std::string>& words, const std::string& layer, bool wanted)
+    : numbers_(numbers(words)), files_(wanted && numbers_.empty() ? words : std::vector<std::string>(), layer) {}
 
-void TauInput::fit(const clratio::Image& shape, const std::vector<std::string>& words, const std::string& layer) {
+void TauInput::fit(const clratio::Image& shape) {
     if (numbers_.size() > 1 && numbers_.size() != shape.channels.size())
         throw UsageError(
             fmt::format("--tau: {} numbers for the {} channels of {}", numbers_.size(), shape.channels.size(), shape.path));
-    if (!numbers_.empty()) return;
     std::vector<double> sum;
-    for (const auto& file : words) {
-        image_ = read_like(shape, file, layer);
+    double files = 0;
+    for (; !files_.done(); ++files) {
+        image_ = files_.next_like(shape);
+        if (files == 0 && files_.done()) return;
         sum.resize(image_.size());
         for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += image_.values[i];
     }
-    const auto files = static_cast<double>(words.size());
     for (std::size_t i = 0; i < sum.size(); ++i) image_.values[i] = static_cast<float>(sum[i] / files);
 }
 

@@ -49,22 +49,35 @@ std::size_t pairs_in_a_launch(const clratio::Image& image);
 /// IoError with row, column and channel of the first NaN or infinity.
 void require_finite(const clratio::Image& image);
 
+/// Images that must have the shape of the batches, read one ahead on a thread from the start.
+class SideReader {
+public:
+    SideReader(std::vector<std::string> files, const std::string& layer);
+
+    bool done() const { return images_.left() == 0; }
+    /// IoError, InvalidArgument where it has another shape.
+    clratio::Image next_like(const clratio::Image& shape);
+    double seconds() const { return images_.seconds(); }
+
+private:
+    ImageReader images_;
+};
+
 /// tau as numbers, or as an image: the mean of all --tau files.
 class TauInput {
 public:
-    /// UsageError where numbers and files are mixed.
-    explicit TauInput(const std::vector<std::string>& words);
-    /// Reads the files, or compares the count of numbers with the channels. UsageError, IoError.
-    void fit(const clratio::Image& shape, const std::vector<std::string>& words, const std::string& layer);
+    /// Begins to read the files, if they are `wanted`. UsageError where numbers and files are mixed.
+    TauInput(const std::vector<std::string>& words, const std::string& layer, bool wanted);
+    /// Waits for the files, or compares the count of numbers with the channels. UsageError, IoError.
+    void fit(const clratio::Image& shape);
 
     operator clratio::Tau() const;
+    double seconds() const { return files_.seconds(); }  ///< spent reading
 
 private:
     std::vector<float> numbers_;
+    SideReader files_;
     clratio::Image image_;
 };
-
-/// IoError, InvalidArgument where it has another shape.
-clratio::Image read_like(const clratio::Image& shape, const std::string& file, const std::string& layer);
 
 }  // namespace tool::combining

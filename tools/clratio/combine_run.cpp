@@ -74,7 +74,9 @@ Intervals summary(const clratio::CombinedImage& out, const clratio::Image& refer
 }  // namespace
 
 CombineRun::CombineRun(const Options& options)
-    : options_(options), tau_(options.tau), keeper_(options),
+    : options_(options), tau_(options.tau, options.layer, !options.output.empty()),
+      reference_file_(options.reference.empty() ? std::vector<std::string>() : std::vector{options.reference}, options.layer),
+      keeper_(options),
       engine_(timed(report_.seconds.device, [] { return clratio::Engine{}; })), moments_(options.moments()) {
     report_.device = engine_.info().name;
     report_.held = batches();
@@ -88,11 +90,8 @@ CombineRun::CombineRun(const Options& options)
 
 // What depends on the size of the images: said before the batches are added, not after.
 void CombineRun::fit_tau() {
-    if (!options_.output.empty())
-        timed(report_.seconds.decode, [&] { tau_.fit(keeper_.shape(), options_.tau, options_.layer); });
-    if (!options_.reference.empty())
-        reference_ =
-            timed(report_.seconds.decode, [&] { return read_like(keeper_.shape(), options_.reference, options_.layer); });
+    if (!options_.output.empty()) tau_.fit(keeper_.shape());
+    if (!reference_file_.done()) reference_ = reference_file_.next_like(keeper_.shape());
 }
 
 std::vector<clratio::HostBatch> CombineRun::accept(const std::vector<Pair>& pairs) {
@@ -120,11 +119,11 @@ void CombineRun::add(const std::vector<Pair>& pairs) {
     if (keeper_.due()) save();
 }
 
-void CombineRun::add_and_read_out(const std::vector<Pair>& pairs) {
+void CombineRun::read_out_at_once(const std::vector<Pair>& pairs) {
     const auto batches = accept(pairs);
     for (const Pair& pair : pairs) keeper_.added(pair);
-    const Bands bands(engine_, pairs.front().m.size(), keeper_.shape().channels.size(), moments_);
-    write(timed(report_.seconds.device, [&] { return bands.at_once(batches, tau_, options_.wanted()); }));
+    const clratio::BatchOptions how{moments_.nonfinite, moments_.weights};
+    write(timed(report_.seconds.device, [&] { return read_at_once(engine_, batches, tau_, options_.wanted(), how); }));
 }
 
 void CombineRun::save() {
@@ -143,11 +142,11 @@ void CombineRun::read_out() {
 }
 
 void CombineRun::write(ReadOut&& read_out) {
+    report_.negatives = read_out.chosen.negatives;
     const auto out = clratio::combined_image(std::move(read_out.chosen), keeper_.shape());
     report_.batches = batches();
     report_.ranges = keeper_.ranges().text();
     report_.flags = out.flags;
-    report_.negatives = read_out.negatives;
     if (options_.interval) report_.intervals = summary(out, reference_);
     rms_error_ = root_mean_square(out.standard_error.values);
     if (!options_.reference.empty()) {
@@ -172,7 +171,7 @@ void CombineRun::write(ReadOut&& read_out) {
 }
 
 int CombineRun::report(double decode) {
-    report_.seconds.decode += decode;
+    report_.seconds.decode += decode + tau_.seconds() + reference_file_.seconds();
     report_.shape = keeper_.shape();
     report_.batches = batches();
     report_.ranges = keeper_.ranges().text();

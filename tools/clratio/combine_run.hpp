@@ -16,8 +16,9 @@ public:
 
     /// Adds to the sums; saves them where --checkpoint says so.
     void add(const std::vector<Pair>& pairs);
-    /// Where these are all there will ever be, and no state is kept: adds and reads out in one pass.
-    void add_and_read_out(const std::vector<Pair>& pairs);
+    /// Where these are all there will ever be, no state is kept, and there are no groups.
+    void read_out_at_once(const std::vector<Pair>& pairs);
+    bool has_groups() const { return moments_.groups > 1; }
     /// Saves what was added since the last time; nothing where the device failed in the middle of adding.
     void save();
     /// save() after `work`, however it ends.
@@ -47,6 +48,7 @@ private:
 
     const Options& options_;
     TauInput tau_;
+    SideReader reference_file_;
     Report report_;
     StateKeeper keeper_;
     clratio::Engine engine_;

@@ -1,8 +1,10 @@
 // The command line. A subcommand is one file with one add_ function; it is registered here.
 #include <csignal>
 #include <cstdio>
+#include <thread>
 
 #include "clratio/exception.hpp"
+#include "clratio/image.hpp"
 #include "tool.hpp"
 
 namespace {
@@ -46,6 +48,7 @@ int run_command(int argc, char** argv) {
         return fail(std::string(e.what()) + " (see clratio --help)", tool::usage);
     }
     if (!run) return fail("a subcommand is needed: devices, combine, ... (see clratio --help)", tool::usage);
+    clratio::set_image_threads(std::thread::hardware_concurrency());
     try {
         return run();
     } catch (const tool::UsageError& e) {

@@ -40,17 +40,14 @@ CLR_FN clr_span clr_my_span(clr_range range) {
     return s;
 }
 
-// The lanes first .. first + CLR_WIDTH - 1 of a view of `count` values; lanes past the end are 0.
-CLR_FN clr_real clr_load_view(global const float* p, clr_layout view, ulong first, ulong count) {
-    p += view.offset;
-    if (view.stride == view.channels && first + CLR_WIDTH <= count) return clr_load(p + first);
-    if (view.stride == 0 && view.channels == 1) return (clr_real)(*p);
-    ulong pixel = first / view.channels;
-    uint channel = (uint)(first - pixel * view.channels);
+// Of views with gaps, and of a last vector that is not whole; p is the view's first element.
+CLR_RARE_FN clr_real clr_load_lanes(global const float* p, uint stride, uint channels, ulong first, ulong count) {
+    ulong pixel = first / channels;
+    uint channel = (uint)(first - pixel * channels);
     float lane[CLR_WIDTH];
     for (int i = 0; i < CLR_WIDTH; ++i) {
-        lane[i] = first + i < count ? p[pixel * view.stride + channel] : 0.0f;
-        if (++channel == view.channels) {
+        lane[i] = first + i < count ? p[pixel * stride + channel] : 0.0f;
+        if (++channel == channels) {
             channel = 0;
             ++pixel;
         }
@@ -58,23 +55,34 @@ CLR_FN clr_real clr_load_view(global const float* p, clr_layout view, ulong firs
     return clr_load(lane);
 }
 
-CLR_FN void clr_store_view(clr_real v, global float* p, clr_layout view, ulong first, ulong count) {
-    p += view.offset;
-    if (view.stride == view.channels && first + CLR_WIDTH <= count) {
-        clr_store(v, p + first);
-        return;
-    }
-    ulong pixel = first / view.channels;
-    uint channel = (uint)(first - pixel * view.channels);
+CLR_RARE_FN void clr_store_lanes(clr_real v, global float* p, uint stride, uint channels, ulong first, ulong count) {
+    ulong pixel = first / channels;
+    uint channel = (uint)(first - pixel * channels);
     float lane[CLR_WIDTH];
     clr_store(v, lane);
     for (int i = 0; i < CLR_WIDTH && first + i < count; ++i) {
-        p[pixel * view.stride + channel] = lane[i];
-        if (++channel == view.channels) {
+        p[pixel * stride + channel] = lane[i];
+        if (++channel == channels) {
             channel = 0;
             ++pixel;
         }
     }
+}
+
+// The lanes first .. first + CLR_WIDTH - 1 of a view of `count` values; lanes past the end are 0.
+CLR_FN clr_real clr_load_view(global const float* p, clr_layout view, ulong first, ulong count) {
+    p += view.offset;
+    if (view.stride == view.channels && first + CLR_WIDTH <= count) return clr_load(p + first);
+    if (view.stride == 0 && view.channels == 1) return (clr_real)(*p);
+    return clr_load_lanes(p, view.stride, view.channels, first, count);
+}
+
+CLR_FN void clr_store_view(clr_real v, global float* p, clr_layout view, ulong first, ulong count) {
+    p += view.offset;
+    if (view.stride == view.channels && first + CLR_WIDTH <= count)
+        clr_store(v, p + first);
+    else
+        clr_store_lanes(v, p, view.stride, view.channels, first, count);
 }
 
 // The same for a view that no kernel argument reads: a large one goes past the caches, which would read each line before it

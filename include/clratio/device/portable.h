@@ -34,8 +34,10 @@
 // PoCL leaves functions that return structures as calls: read-outs over groups take 2.4 times as long. Not for others:
 // oclgrind cannot run what clang makes of it.
 #define CLR_FN static inline __attribute__((always_inline))
+#define CLR_RARE_FN static __attribute__((noinline))  // large, and seldom called
 #else
 #define CLR_FN static inline
+#define CLR_RARE_FN static
 #endif
 #define CLR_CONSTANT constant
 #define CLR_GLOBAL global
