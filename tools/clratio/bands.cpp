@@ -106,8 +106,8 @@ ReadOut Bands::read_out(const Tau& tau, const Wanted& wanted) const {
     return out;
 }
 
-ReadOut read_at_once(const clratio::Engine& engine, std::span<const HostBatch> batches, const Tau& tau,
-                     const Wanted& wanted, const clratio::BatchOptions& how) {
+ReadOut read_at_once(const clratio::Engine& engine, std::span<const HostBatch> batches, const Tau& tau, const Wanted& wanted,
+                     const clratio::BatchOptions& how) {
     ReadOut out{clratio::combine_batches(engine, batches, tau, wanted.options, how), {}};
     if (wanted.mean) out.mean = clratio::combine_batches(engine, batches, tau, plain_mean(wanted.options), how);
     return out;

@@ -75,9 +75,10 @@ Intervals summary(const clratio::CombinedImage& out, const clratio::Image& refer
 
 CombineRun::CombineRun(const Options& options)
     : options_(options), tau_(options.tau, options.layer, !options.output.empty()),
-      reference_file_(options.reference.empty() ? std::vector<std::string>() : std::vector{options.reference}, options.layer),
-      keeper_(options),
-      engine_(timed(report_.seconds.device, [] { return clratio::Engine{}; })), moments_(options.moments()) {
+      reference_file_(options.reference.empty() ? std::vector<std::string>() : std::vector{options.reference},
+                      options.layer),
+      keeper_(options), engine_(timed(report_.seconds.device, [] { return clratio::Engine{}; })),
+      moments_(options.moments()) {
     report_.device = engine_.info().name;
     report_.held = batches();
     if (const auto sums = keeper_.take_sums()) {
