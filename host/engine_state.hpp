@@ -3,7 +3,6 @@
 
 #include <map>
 #include <mutex>
-#include <thread>
 
 #include "clratio/engine.hpp"
 #include "opencl.hpp"
@@ -11,6 +10,8 @@
 namespace clratio {
 
 struct Engine::State {
+    ~State();  ///< keeps binaries of programs built here in the disk cache: not while anyone waits for a result
+
     Context context;
     Queue queue;
     cl_device_id device = nullptr;
@@ -24,16 +25,12 @@ struct Engine::State {
     std::mutex mutex;
     struct Built {
         Program program;
-        bool unsaved;
+        std::string unsaved;  ///< the key in the disk cache, where it is not there yet
     };
     std::map<std::string, Built> programs;  ///< by word, width and build options
-    std::vector<std::jthread> savers;       ///< write binaries to the disk cache; joined before the programs go
 };
 
 /// The program of kernels/WORD.cl: from memory, from the disk cache, or built now.
 Program program(Engine::State& state, const std::string& word, int width, const std::string& options);
-
-/// Where this process built the program: once `first` is done, keeps its binary on disk, in the background.
-void save_program(Engine::State& state, const std::string& word, int width, const std::string& options, const Event& first);
 
 }  // namespace clratio

@@ -163,8 +163,7 @@ void check_overlap(const char* name, const View& output, const char* other_name,
 
 Launch::Launch(const Engine& engine, const std::string& word, const std::string& kernel, const std::string& options,
                Lanes lanes)
-    : engine_(engine), word_(word), name_(kernel), options_(options),
-      width_(lanes == Lanes::wide ? engine.state().wide : engine.width()) {
+    : engine_(engine), width_(lanes == Lanes::wide ? engine.state().wide : engine.width()) {
     cl_int code = CL_SUCCESS;
     kernel_ = Kernel(clCreateKernel(program(engine.state(), word, width_, options).get(), kernel.c_str(), &code));
     check(code, "clCreateKernel");
@@ -211,7 +210,6 @@ Event Launch::enqueue(std::size_t global, std::size_t local) {
           "clEnqueueNDRangeKernel");
     Event event(done);
     check(clFlush(engine_.queue()), "clFlush");
-    save_program(engine_.state(), word_, width_, options_, event);
     return event;
 }
 

@@ -89,7 +89,6 @@ private:
     Event enqueue(std::size_t global, std::size_t local);
 
     Engine engine_;
-    std::string word_, name_, options_;
     int width_;
     Kernel kernel_;
     cl_uint next_ = 0;

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <chrono>
 #include <set>
 
 #include "cache.hpp"
@@ -126,26 +127,37 @@ Program program(Engine::State& s, const std::string& word, int width, const std:
     const std::string source = flatten_kernel(word);
     const std::string options = build_options(s, width, extra);
     const auto folder = s.options.disk_cache ? cache::folder() : std::filesystem::path();
-    if (!folder.empty()) {
-        const std::string key = cache_key(s, word, options, source);
+    const std::string key = folder.empty() ? "" : cache_key(s, word, options, source);
+    if (!folder.empty())
         if (const auto binary = cache::load(cache::entry(folder, key), key))
-            if (Program p = from_binary(s, *binary, options)) return s.programs[name] = {p, false}, p;
-    }
+            if (Program p = from_binary(s, *binary, options)) return s.programs[name] = {p, ""}, p;
     Program p = from_source(s, word, source, options);
-    s.programs[name] = {p, !folder.empty()};
+    s.programs[name] = {p, key};
     return p;
 }
 
-void save_program(Engine::State& s, const std::string& word, int width, const std::string& extra, const Event& first) {
-    const std::scoped_lock lock(s.mutex);
-    const auto built = s.programs.find(name_of(word, width, extra));
-    if (built == s.programs.end() || !std::exchange(built->second.unsaved, false)) return;
-    const std::string key = cache_key(s, word, build_options(s, width, extra), flatten_kernel(word));
-    s.savers.emplace_back([p = built->second.program, first, key, path = cache::entry(cache::folder(), key)] {
-        const cl_event e = first.get();
-        clWaitForEvents(1, &e);
-        if (const auto binary = binary_of(p.get()); !binary.empty()) cache::store(path, key, binary);
-    });
+namespace {
+
+// PoCL compiles every kernel of a program again to give its binary, seconds in which no kernel starts: what is not begun in
+// time is left to the next process.
+void save_binaries(const Engine::State& s) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds{1};
+    for (const auto& [name, built] : s.programs) {
+        if (built.unsaved.empty()) continue;
+        if (std::chrono::steady_clock::now() > end) return;
+        if (const auto binary = binary_of(built.program.get()); !binary.empty())
+            cache::store(cache::entry(cache::folder(), built.unsaved), built.unsaved, binary);
+    }
+}
+
+}  // namespace
+
+Engine::State::~State() {
+    try {
+        save_binaries(*this);
+    } catch (...) {
+        // A cache may fail in silence.
+    }
 }
 
 }  // namespace clratio

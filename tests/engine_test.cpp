@@ -220,7 +220,7 @@ TEST(Cache, a_second_engine_starts_from_the_file_and_a_damaged_one_is_rebuilt) {
 
     const Engine second;
     EXPECT_EQ(small_job(second), small_answer);
-    for (const auto& [name, built] : second.state().programs) EXPECT_FALSE(built.unsaved) << name;
+    for (const auto& [name, built] : second.state().programs) EXPECT_EQ(built.unsaved, "") << name;
 
     for (const std::size_t at : {std::size_t{0}, whole.size() / 3, whole.size() / 2, whole.size() - 1}) {
         std::string damaged = whole;

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "output_file.hpp"
+#include "parallel.hpp"
 #include "study.hpp"
 
 namespace tool::study {
@@ -72,9 +73,10 @@ Averages averages_of(const clratio::MediumScene& scene, std::uint64_t seeds) {
     const double values = 3 * static_cast<double>(std::max<std::uint64_t>(1, pixels));
     Averages out{scene.frame(), pixels, seeds, {}};
     for (const auto sampling : compared) {
-        std::vector<ImageErrors> of_seeds;
-        for (std::uint64_t seed = 0; seed < seeds; ++seed)
-            of_seeds.push_back(errors_of(scene, sampling, seed, tau, reference, values));
+        std::vector<ImageErrors> of_seeds(seeds);
+        in_parallel(seeds, [&](std::size_t seed) {
+            of_seeds[seed] = errors_of(scene, sampling, seed, tau, reference, values);
+        });
         const auto over_seeds = [&](std::uint32_t level, std::size_t order) {
             std::vector<double> squares, sums;
             for (const auto& one : of_seeds) {
