@@ -90,15 +90,11 @@ void describe_members(device::clr_groups& all) {
     using namespace device;
     const auto weight_of = [&](std::uint32_t g) { return clr_two{all.of[g].weight_hi, all.of[g].weight_lo}; };
     clr_two sum = weight_of(0);
-    std::vector<clr_entry> entries{{}};
-    for (std::uint32_t g = 1; g < all.count; ++g) {
-        const clr_two before = sum;
-        sum = clr_two_add(sum, weight_of(g));
-        entries.push_back(clr_entry_make(before, weight_of(g), sum));
-    }
+    for (std::uint32_t g = 1; g < all.count; ++g) sum = clr_two_add(sum, weight_of(g));
+    const clr_whole whole = clr_whole_of(sum);
     for (std::uint32_t g = 0; g < all.count; ++g) {
-        const clr_part part = clr_part_of(weight_of(g), sum);
-        all.member[g] = {entries[g].share.hi, entries[g].share.lo, entries[g].spread, part.p, part.a};
+        const clr_part part = clr_part_of(weight_of(g), whole);
+        all.member[g] = {part.p.hi, part.p.lo, part.a, part.apart};
     }
 }
 

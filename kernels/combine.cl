@@ -47,26 +47,95 @@ CLR_FN clr_evidence clr_whole_evidence(const clr_groups* groups, uint reliabilit
     return clr_evidence_of((clr_uint)(sum.batches), weight, weight2, reliability);
 }
 
-CLR_FN clr_record clr_join(clr_record all, clr_record more, const clr_groups* groups, uint g, bool with_ratios) {
-    if (groups->options & CLR_STATE_PER_VALUE) return clr_record_join(all, more, with_ratios);
+#if defined(CLR_MANY_GROUPS)
+
+CLR_FN bool clr_weighs_values(const clr_groups* groups) { return (groups->options & CLR_STATE_PER_VALUE) != 0; }
+
+CLR_FN clr_part clr_part_in(const clr_groups* groups, uint g, clr_record group, clr_whole whole) {
+    if (clr_weighs_values(groups)) return clr_part_of(group.weight, whole);
     const clr_member member = groups->member[g];
-    clr_entry entry;
-    entry.share = clr_both(member.share_hi, member.share_lo);
-    entry.spread = (clr_real)(member.spread);
-    all.moments = clr_moments_join(all.moments, more.moments, entry);
-    if (with_ratios) all.ratios = clr_ratios_merge(all.ratios, more.ratios, entry);
+    clr_part w;
+    w.p = clr_both(member.p_hi, member.p_lo);
+    w.a = (clr_real)(member.a);
+    w.weight = group.weight.hi;
+    w.apart = (clr_real)(member.apart);
+    return w;
+}
+
+// Of a value that has lost no batch.
+CLR_FN clr_whole clr_whole_of_all(const clr_groups* groups) {
+    clr_whole whole = clr_whole_of(clr_both(0.0f, 0.0f));
+    for (uint g = 0; g < groups->count; ++g) {
+        clr_record group;
+        group.weight = clr_both(groups->of[g].weight_hi, groups->of[g].weight_lo);
+        whole = clr_count_part(whole, clr_part_in(groups, g, group, whole));
+    }
+    return whole;
+}
+
+// Weights and batches together, value by value.
+CLR_FN clr_record clr_weigh(clr_planes base, const clr_groups* groups, clr_whole* whole, ulong i) {
+    clr_record all = clr_load_group(base, groups, 0, i);
+    for (uint g = 1; g < groups->count; ++g) {
+        const clr_record more = clr_load_group(base, groups, g, i);
+        all.weight = clr_two_add(all.weight, more.weight);
+        all.weight2 = clr_two_add(all.weight2, more.weight2);
+        all.batches += more.batches;
+    }
+    *whole = clr_whole_of(all.weight);
+    for (uint g = 0; g < groups->count; ++g)
+        *whole = clr_count_part(*whole, clr_part_in(groups, g, clr_load_group(base, groups, g, i), *whole));
     return all;
 }
 
-CLR_FN clr_part clr_part_in(const clr_groups* groups, uint g, clr_record group, clr_record all, clr_evidence whole) {
-    if (groups->options & CLR_STATE_PER_VALUE) return clr_part_of(group.weight, all.weight);
-    clr_part w;
-    w.p = (clr_real)(groups->member[g].p);
-    w.a = (clr_real)(groups->member[g].a);
-    w.all = whole.weight;
-    w.none = groups->of[g].batches == 0 ? clr_always() : clr_never();
-    return w;
+CLR_FN clr_record clr_pool_groups(clr_record all, clr_planes base, const clr_groups* groups, clr_whole whole, ulong i) {
+    all.moments = clr_moments_none();
+    all.ratios = clr_ratios_none();
+    for (uint g = 0; g < groups->count; ++g) {
+        if (groups->of[g].batches == 0) continue;
+        const clr_record group = clr_load_group(base, groups, g, i);
+        const clr_part part = clr_part_in(groups, g, group, whole);
+        clr_prefetch_moments(base, clr_state_of(groups, g), i + CLR_TILE);
+        all.moments = clr_pool(all.moments, group.moments, part.p);
+        all.ratios = clr_pool_ratios(all.ratios, group.ratios, part.p);
+    }
+    return all;
 }
+
+CLR_FN clr_joint clr_join(clr_planes base, const clr_groups* groups, clr_whole whole, clr_evidence n, clr_real tau,
+                          clr_question ask, ulong i) {
+    clr_record all = clr_load_group(base, groups, 0, i);
+    if (clr_weighs_values(groups)) all = clr_weigh(base, groups, &whole, i);
+    all = clr_pool_groups(all, base, groups, whole, i);
+    clr_joint j = clr_joint_means(all, whole, tau, ask.zero_policy);
+    for (uint g = 0; g < groups->count; ++g) {
+        if (groups->of[g].batches == 0) continue;
+        const clr_record group = clr_load_group(base, groups, g, i);
+        j.folds = clr_fold(j.folds, j.all.moments, j.q, group.moments, clr_part_in(groups, g, group, whole));
+    }
+    j.spread = clr_spread_of_groups(j.all.moments, j.q.quotient, j.folds);
+    j.n = n;
+    if (!clr_asks_line(ask)) return j;
+    const clr_real slope = clr_slope_of_regression(j.spread.mt, j.spread.tt);
+    for (uint g = 0; g < groups->count; ++g) {
+        if (groups->of[g].batches == 0) continue;
+        const clr_record group = clr_load_group(base, groups, g, i);
+        j.folds = clr_fold_line(j.folds, j.all.moments, slope, group.moments, clr_part_in(groups, g, group, whole));
+    }
+    j.spread.line = clr_line_residual(j.all.moments, slope) + j.folds.between.line;
+    return j;
+}
+
+#else
+
+CLR_FN clr_whole clr_whole_of_all(const clr_groups* groups) { return clr_whole_of(clr_both(0.0f, 0.0f)); }
+
+CLR_FN clr_joint clr_join(clr_planes base, const clr_groups* groups, clr_whole whole, clr_evidence n, clr_real tau,
+                          clr_question ask, ulong i) {
+    return clr_joint_of(clr_load_group(base, groups, 0, i), n, tau, ask.zero_policy);
+}
+
+#endif
 
 kernel void clr_combine_moments(CLR_PLANE_ARGUMENTS(s), clr_groups groups, CLR_READING_ARGUMENTS, clr_range range) {
     const clr_planes base = CLR_PLANES(s);
@@ -78,33 +147,20 @@ kernel void clr_combine_moments(CLR_PLANE_ARGUMENTS(s), clr_groups groups, CLR_R
     groups.options = CLR_STATE_OPTIONS;
 #endif
     const bool skips = groups.options & CLR_STATE_PER_VALUE;
-    const clr_evidence whole = clr_whole_evidence(&groups, ask.reliability);
+    const clr_evidence n = clr_whole_evidence(&groups, ask.reliability);
+    const clr_whole whole = clr_whole_of_all(&groups);
     clr_flag_tally tally = {{(clr_uint)(0u)}};
     const clr_span span = clr_my_span(range);
     for (ulong v = span.begin; v < span.end; v += span.step) {
         const ulong first = v * CLR_WIDTH;
         const clr_real control = clr_load_view(tau, reading.tau, first, range.count);
-        clr_record all = clr_load_group(base, &groups, 0, first);
-#if defined(CLR_MANY_GROUPS)
-        for (uint g = 1; g < groups.count; ++g) {
-            all = clr_join(all, clr_load_group(base, &groups, g, first), &groups, g, clr_uses_ratios(ask.estimator));
-        }
-#endif
-        all.moments = clr_moments_settle(all.moments);
-        if (!skips) all.batches = whole.batches;
-        const clr_quotient q = clr_divide_means(all.moments.m, all.moments.t, control, ask.zero_policy);
-        const clr_evidence n = skips ? clr_evidence_of(all.batches, all.weight, all.weight2, ask.reliability) : whole;
-        clr_folds folds = clr_folds_begin();
-#if defined(CLR_MANY_GROUPS)
-        for (uint g = 0; clr_uses_groups(ask.estimator) && g < groups.count; ++g) {
-            const clr_record group = clr_load_group(base, &groups, g, first);
-            folds = clr_fold(folds, all.moments, q, group.moments, clr_part_in(&groups, g, group, all, whole), control,
-                             ask.estimator);
-        }
-#endif
-        const clr_residual d = clr_folds_residual(ask.estimator) ? folds.residual : clr_residual_of(all.moments, q.quotient);
-        const clr_estimate e = clr_read_out(all, q, d, n, folds, reading.added, control,
-                                            clr_quantile_for(all.batches, reading, quantiles), ask);
+        clr_joint j = clr_join(base, &groups, whole, n, control, ask, first);
+        if (skips)
+            j.n = clr_evidence_of(j.all.batches, j.all.weight, j.all.weight2, ask.reliability);
+        else
+            j.all.batches = n.batches;
+        const clr_estimate e =
+            clr_read_out(j, reading.added, control, clr_quantile_for(j.all.batches, reading, quantiles), ask);
         clr_write_reading(e, reading, ask.outputs, to, &tally, first, range.count);
     }
     clr_store_flag_tally(&tally, flag_rows);

@@ -74,12 +74,6 @@ CLR_FN void clr_put_back(clr_moments moments, const clr_adder* a, ulong at) {
                        a->planes, a->state, at);
 }
 
-CLR_FN clr_moments clr_no_moments(void) {
-    clr_moments s;
-    s.m = s.t = s.mm = s.tt = s.mt = clr_both(0.0f, 0.0f);
-    return s;
-}
-
 // Batch k over a block of whole vectors of contiguous values. The first pass takes the state from the planes. The last one
 // puts it back, save for vectors in doubt, of which it gives a bit each.
 CLR_FN uint clr_pass(const bool is_first, const bool is_last, uint k, clr_block* block, const clr_adder* a, ulong first,
@@ -142,7 +136,7 @@ CLR_FN uint clr_fill_block(const bool keeps, clr_block* block, clr_adder* a, ulo
     if (keeps)
         clr_pass(true, false, 0, block, a, first, &least);
     else
-        for (uint v = 0; v < CLR_BLOCK; ++v) block->moments[v] = clr_no_moments();
+        for (uint v = 0; v < CLR_BLOCK; ++v) block->moments[v] = clr_moments_none();
     for (uint k = keeps ? 1 : 0; k < a->batches->count; ++k) clr_pass(false, false, k, block, a, first, &least);
     if (clr_any(least < (clr_real)(0.0f))) clr_count_negative(a, first);
     uint doubtful = 0;
@@ -217,11 +211,8 @@ CLR_FN void clr_read_record(clr_record r, clr_evidence n, clr_reader* reader, ul
     ask.estimator = CLR_ESTIMATOR;
     ask.outputs = CLR_ASKED;
     const clr_real control = clr_load_view(reader->tau, reader->reading.tau, first, count);
-    r.moments = clr_moments_settle(r.moments);
-    const clr_quotient q = clr_divide_means(r.moments.m, r.moments.t, control, ask.zero_policy);
-    const clr_estimate e =
-        clr_read_out(r, q, clr_residual_of(r.moments, q.quotient), n, clr_folds_begin(), reader->reading.added, control,
-                     clr_quantile_for(r.batches, reader->reading, reader->quantiles), ask);
+    const clr_estimate e = clr_read_out(clr_joint_of(r, n, control, ask.zero_policy), reader->reading.added, control,
+                                        clr_quantile_for(r.batches, reader->reading, reader->quantiles), ask);
     clr_write_reading(e, reader->reading, ask.outputs, reader->to, &reader->tally, first, count);
 }
 

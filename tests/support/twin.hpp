@@ -37,26 +37,43 @@ struct TwinValue {
     }
 };
 
+/// What the kernels know of a value's groups together.
+inline device::clr_joint join_twin(std::span<const TwinValue> groups, float tau, const device::clr_question& ask) {
+    using namespace device;
+    clr_record all = groups[0].record;
+    for (const auto& g : groups.subspan(1)) {
+        all.weight = clr_two_add(all.weight, g.record.weight);
+        all.weight2 = clr_two_add(all.weight2, g.record.weight2);
+        all.batches += g.record.batches;
+    }
+    const auto n = clr_evidence_of(all.batches, all.weight, all.weight2, ask.reliability);
+    if (groups.size() == 1) return clr_joint_of(all, n, tau, ask.zero_policy);
+
+    clr_whole whole = clr_whole_of(all.weight);
+    const auto part = [&](const TwinValue& g) { return clr_part_of(g.record.weight, whole); };
+    for (const auto& g : groups) whole = clr_count_part(whole, part(g));
+    all.moments = clr_moments_none();
+    all.ratios = clr_ratios_none();
+    for (const auto& g : groups) {
+        all.moments = clr_pool(all.moments, g.record.moments, part(g).p);
+        all.ratios = clr_pool_ratios(all.ratios, g.record.ratios, part(g).p);
+    }
+    clr_joint j = clr_joint_means(all, whole, tau, ask.zero_policy);
+    for (const auto& g : groups) j.folds = clr_fold(j.folds, j.all.moments, j.q, g.record.moments, part(g));
+    j.spread = clr_spread_of_groups(j.all.moments, j.q.quotient, j.folds);
+    const float slope = clr_slope_of_regression(j.spread.mt, j.spread.tt);
+    for (const auto& g : groups) j.folds = clr_fold_line(j.folds, j.all.moments, slope, g.record.moments, part(g));
+    j.spread.line = clr_line_residual(j.all.moments, slope) + j.folds.between.line;
+    j.n = n;
+    return j;
+}
+
 /// What a kernel reads out of the groups of a value.
 inline device::clr_estimate read_twin(std::span<const TwinValue> groups, float tau, const device::clr_question& ask,
                                       float quantile = 0) {
-    using namespace device;
-    clr_record all = groups[0].record;
-    std::uint32_t offered = groups[0].offered;
-    for (const auto& g : groups.subspan(1)) {
-        all = clr_record_join(all, g.record, clr_uses_ratios(ask.estimator));
-        offered += g.offered;
-    }
-    all.moments = clr_moments_settle(all.moments);
-    const clr_quotient q = clr_divide_means(all.moments.m, all.moments.t, tau, ask.zero_policy);
-    clr_folds folds = clr_folds_begin();
-    if (clr_uses_groups(ask.estimator))
-        for (const auto& g : groups)
-            folds = clr_fold(folds, all.moments, q, g.record.moments, clr_part_of(g.record.weight, all.weight), tau,
-                             ask.estimator);
-    const clr_evidence n = clr_evidence_of(all.batches, all.weight, all.weight2, ask.reliability);
-    const clr_residual d = clr_folds_residual(ask.estimator) ? folds.residual : clr_residual_of(all.moments, q.quotient);
-    return clr_read_out(all, q, d, n, folds, offered, tau, quantile, ask);
+    std::uint32_t offered = 0;
+    for (const auto& g : groups) offered += g.offered;
+    return device::clr_read_out(join_twin(groups, tau, ask), offered, tau, quantile, ask);
 }
 
 inline device::clr_estimate read_twin(const TwinValue& value, float tau, std::uint32_t estimator = CLR_ESTIMATOR_RATIO,

@@ -38,6 +38,13 @@ CLR_FN clr_entry clr_entry_make(clr_two weight, clr_two added, clr_two sum) {
 // Whether batch number `index`, counted from 0 over the life of the state, is one that settles.
 CLR_FN bool clr_settles(clr_u32 index) { return (index + 1u) % CLR_BATCHES_BETWEEN_SETTLING == 0u; }
 
+CLR_FN clr_moments clr_moments_none(void) {
+    const clr_real zero = (clr_real)(0.0f);
+    clr_moments s;
+    s.m = s.t = s.mm = s.tt = s.mt = clr_two_make(zero, zero);
+    return s;
+}
+
 CLR_FN clr_moments clr_moments_settle(clr_moments s) {
     s.m = clr_two_settle(s.m);
     s.t = clr_two_settle(s.t);
@@ -66,20 +73,23 @@ CLR_FN clr_moments clr_moments_add(clr_moments s, clr_real m, clr_real t, clr_en
     return s;
 }
 
-// Chan, Golub, LeVeque 1979: b's batches as if they had been added after a's. `join` leaves loose pairs.
-CLR_FN clr_moments clr_moments_join(clr_moments a, clr_moments b, clr_entry e) {
+// Chan, Golub, LeVeque 1979: b's batches as if they had been added after a's.
+CLR_FN clr_moments clr_moments_merge(clr_moments a, clr_moments b, clr_entry e) {
     a.mm = clr_two_gather(a.mm, b.mm);
     a.tt = clr_two_gather(a.tt, b.tt);
     a.mt = clr_two_gather(a.mt, b.mt);
-    return clr_moments_move(a, clr_two_apart(b.m, a.m), clr_two_apart(b.t, a.t), e);
-}
-
-CLR_FN clr_moments clr_moments_merge(clr_moments a, clr_moments b, clr_entry e) {
-    return clr_moments_settle(clr_moments_join(a, b, e));
+    return clr_moments_settle(clr_moments_move(a, clr_two_apart(b.m, a.m), clr_two_apart(b.t, a.t), e));
 }
 
 CLR_FN clr_two clr_two_advance(clr_two mean, clr_two to, clr_two share) {
     return clr_two_add(mean, clr_two_multiply(clr_two_subtract(to, mean), share));
+}
+
+CLR_FN clr_ratios clr_ratios_none(void) {
+    const clr_real zero = (clr_real)(0.0f);
+    clr_ratios s;
+    s.quotient = s.zero_m = s.zero_share = clr_two_make(zero, zero);
+    return s;
 }
 
 CLR_FN clr_ratios clr_ratios_merge(clr_ratios a, clr_ratios b, clr_entry e) {
@@ -109,20 +119,14 @@ typedef struct {
 } clr_record;
 
 // The same for all that a state knows.
-CLR_FN clr_record clr_record_join(clr_record a, clr_record b, bool with_ratios) {
+CLR_FN clr_record clr_record_merge(clr_record a, clr_record b, bool with_ratios) {
     const clr_two sum = clr_two_add(a.weight, b.weight);
     const clr_entry e = clr_entry_make(a.weight, b.weight, sum);
-    a.moments = clr_moments_join(a.moments, b.moments, e);
+    a.moments = clr_moments_merge(a.moments, b.moments, e);
     if (with_ratios) a.ratios = clr_ratios_merge(a.ratios, b.ratios, e);
     a.weight = sum;
     a.weight2 = clr_two_add(a.weight2, b.weight2);
     a.batches += b.batches;
-    return a;
-}
-
-CLR_FN clr_record clr_record_merge(clr_record a, clr_record b, bool with_ratios) {
-    a = clr_record_join(a, b, with_ratios);
-    a.moments = clr_moments_settle(a.moments);
     return a;
 }
 

@@ -44,9 +44,9 @@ typedef struct {
     clr_u32 options;
 } clr_state;
 
-// Where no value has skipped a batch: how a group joins those before it, and its clr_part of them all.
+// Where no value has skipped a batch: a group's clr_part of them all.
 typedef struct {
-    float share_hi, share_lo, spread, p, a;
+    float p_hi, p_lo, a, apart;
 } clr_member;
 
 // All groups of a state.
@@ -117,6 +117,21 @@ CLR_FN clr_moments clr_load_moments(clr_planes p, clr_state s, ulong i) {
     r.tt = clr_load_plane(p.tt, s, i);
     r.mt = clr_load_plane(p.mt, s, i);
     return r;
+}
+
+// A vector's share of a tile's hi and lo parts, each cache line of 16 floats once.
+CLR_FN void clr_prefetch_two(global const float* p, clr_state s, ulong i) {
+    p += (i / CLR_TILE * s.groups + s.place) * (2 * CLR_TILE) + i % CLR_TILE * 2;
+    for (int k = 0; k < 2 * CLR_WIDTH; k += 16) clr_prefetch(p + k);
+}
+
+// Several planes are more streams than a processor fetches ahead by itself. i may lie past the end.
+CLR_FN void clr_prefetch_moments(clr_planes p, clr_state s, ulong i) {
+    clr_prefetch_two(p.m, s, i);
+    clr_prefetch_two(p.t, s, i);
+    clr_prefetch_two(p.mm, s, i);
+    clr_prefetch_two(p.tt, s, i);
+    clr_prefetch_two(p.mt, s, i);
 }
 
 CLR_FN void clr_store_moments(clr_moments r, clr_planes p, clr_state s, ulong i) {

@@ -35,9 +35,12 @@
 // oclgrind cannot run what clang makes of it.
 #define CLR_FN static inline __attribute__((always_inline))
 #define CLR_RARE_FN static __attribute__((noinline))  // large, and seldom called
+// OpenCL's own prefetch() does nothing there. Any address will do.
+#define clr_prefetch(p) __builtin_prefetch((const void*)(size_t)(p))
 #else
 #define CLR_FN static inline
 #define CLR_RARE_FN static
+#define clr_prefetch(p) ((void)(p))
 #endif
 #define CLR_CONSTANT constant
 #define CLR_GLOBAL global

@@ -81,6 +81,9 @@ CLR_FN clr_two clr_two_apart(clr_two x, clr_two y) {
     return clr_two_make(s.hi, s.lo + (x.lo - y.lo));
 }
 
+// x - y in float, where both may be loose: where they are close, the difference of their hi parts is exact.
+CLR_FN clr_real clr_two_gap(clr_two x, clr_two y) { return (x.hi - y.hi) + (x.lo - y.lo); }
+
 // The nearest float of a loose pair.
 CLR_FN clr_real clr_two_nearest(clr_two x) { return x.hi + x.lo; }
 

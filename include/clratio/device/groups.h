@@ -1,0 +1,149 @@
+// What the groups of a value's batches say together, and what estimators take from one group after the other. Three passes
+// over the groups: clr_pool joins them, clr_fold measures them against the joint means and the ratio, and clr_fold_line
+// against the regression line. Only what cancels is two-float.
+#ifndef CLRATIO_DEVICE_GROUPS_H
+#define CLRATIO_DEVICE_GROUPS_H
+
+#include "clratio/device/spread.h"
+
+CLR_NAMESPACE_BEGIN
+
+// A group's part of the weight.
+typedef struct {
+    clr_two p;               // of all
+    clr_real a;              // over that of the other groups, p / (1 - p)
+    clr_real weight, apart;  // its own, and a times that of all
+} clr_part;
+
+// What all parts are taken of.
+typedef struct {
+    clr_two weight, inverse;
+    clr_real a;       // the sum of the parts' a
+    clr_uint groups;  // that hold any weight
+} clr_whole;
+
+CLR_FN clr_whole clr_whole_of(clr_two weight) {
+    const clr_real zero = (clr_real)(0.0f), one = (clr_real)(1.0f);
+    const clr_mask none = !(weight.hi > zero);
+    clr_whole all;
+    all.weight = weight;
+    all.inverse = clr_two_divide(clr_two_make(one, zero), clr_two_make(none ? one : weight.hi, none ? zero : weight.lo));
+    all.a = zero;
+    all.groups = (clr_uint)(0u);
+    return all;
+}
+
+CLR_FN clr_part clr_part_of(clr_two group, clr_whole all) {
+    const clr_real zero = (clr_real)(0.0f), one = (clr_real)(1.0f);
+    const clr_two rest = clr_two_subtract(all.weight, group);
+    const clr_mask alone = !(rest.hi > zero);
+    clr_part w;
+    w.p = clr_two_settle(clr_two_times(group, all.inverse));
+    w.a = alone ? zero : group.hi / (alone ? one : rest.hi);
+    w.weight = group.hi;
+    w.apart = w.a * all.weight.hi;
+    return w;
+}
+
+CLR_FN clr_whole clr_count_part(clr_whole all, clr_part w) {
+    all.a += w.a;
+    all.groups += w.weight > (clr_real)(0.0f) ? (clr_uint)(1u) : (clr_uint)(0u);
+    return all;
+}
+
+// ---- the first pass
+
+// Joint means, and sums of the second moments within groups: loose pairs.
+CLR_FN clr_moments clr_pool(clr_moments all, clr_moments group, clr_two p) {
+    all.m = clr_two_gather(all.m, clr_two_times(group.m, p));
+    all.t = clr_two_gather(all.t, clr_two_times(group.t, p));
+    all.mm = clr_two_gather(all.mm, group.mm);
+    all.tt = clr_two_gather(all.tt, group.tt);
+    all.mt = clr_two_gather(all.mt, group.mt);
+    return all;
+}
+
+CLR_FN clr_ratios clr_pool_ratios(clr_ratios all, clr_ratios group, clr_two p) {
+    all.quotient = clr_two_add(all.quotient, clr_two_multiply(group.quotient, p));
+    all.zero_m = clr_two_add(all.zero_m, clr_two_multiply(group.zero_m, p));
+    all.zero_share = clr_two_add(all.zero_share, clr_two_multiply(group.zero_share, p));
+    return all;
+}
+
+// ---- the second and third
+
+// Sums over the groups. u is the residual m - r t of a group's mean about the joint one, and e = u / t_rest with the mean
+// t_rest of all other groups, so that the ratio without the group is the ratio - a e.
+typedef struct {
+    clr_two offset;          // m - r t of the joint means: 0 but for the impulse of eq. (10) and empty denominators
+    clr_real control_error;  // joint t - tau
+    clr_spread between;      // of the groups' means
+    clr_real shift;          // sum of p e; infinite or NaN where some t_rest is 0
+    clr_real ae, aee;        // sums of a e, a e^2
+    clr_real mickey, cross;  // sums of p (r - r_rest)(t - tau) and of p beta_rest (t - tau)
+} clr_folds;
+
+CLR_FN clr_folds clr_folds_begin(clr_moments all, clr_quotient q, clr_real tau) {
+    const clr_real zero = (clr_real)(0.0f);
+    clr_folds f;
+    f.offset = clr_two_apart(all.m, clr_two_multiply(q.quotient, all.t));
+    f.control_error = clr_two_gap(all.t, clr_two_make(tau, zero));
+    f.between.mm = f.between.tt = f.between.mt = f.between.ratio.mm = f.between.ratio.mt = f.between.line = zero;
+    f.shift = f.ae = f.aee = f.mickey = f.cross = zero;
+    return f;
+}
+
+// m - r t - offset to the float's precision: where m.hi and the product are close, their difference is exact.
+CLR_FN clr_real clr_mean_residual(clr_moments group, clr_two r, clr_two offset) {
+    const clr_two p = clr_two_product(r.hi, group.t.hi);
+    const clr_real rest = clr_fma(-r.lo, group.t.hi, clr_fma(-r.hi, group.t.lo, group.m.lo));
+    return ((group.m.hi - p.hi) - offset.hi) + ((rest - p.lo) - offset.lo);
+}
+
+CLR_FN clr_folds clr_fold(clr_folds f, clr_moments all, clr_quotient q, clr_moments group, clr_part w) {
+    const clr_real dm = clr_two_gap(group.m, all.m), dt = clr_two_gap(group.t, all.t);
+    f.between.mm = clr_fma(w.weight * dm, dm, f.between.mm);
+    f.between.mt = clr_fma(w.weight * dm, dt, f.between.mt);
+    f.between.tt = clr_fma(w.weight * dt, dt, f.between.tt);
+
+    const clr_real u = clr_mean_residual(group, q.quotient, f.offset), heavy = w.weight * u;
+    f.between.ratio.mm = clr_fma(heavy, u, f.between.ratio.mm);
+    f.between.ratio.mt = clr_fma(heavy, dt, f.between.ratio.mt);
+
+    const clr_real e = u / clr_fma(-w.a, dt, q.denominator), ae = w.a * e;
+    f.shift = clr_fma(w.p.hi, e, f.shift);
+    f.ae += ae;
+    f.aee = clr_fma(ae, e, f.aee);
+    f.mickey = clr_fma(w.p.hi * ae, dt + f.control_error, f.mickey);
+    return f;
+}
+
+// `within`: the pooled moments; `slope`: of the regression over all batches.
+CLR_FN clr_folds clr_fold_line(clr_folds f, clr_moments within, clr_real slope, clr_moments group, clr_part w) {
+    const clr_real dm = clr_two_gap(group.m, within.m), dt = clr_two_gap(group.t, within.t);
+    const clr_real off = clr_fma(-slope, dt, dm);
+    f.between.line = clr_fma(w.weight * off, off, f.between.line);
+
+    const clr_real apart = w.apart * dt;
+    const clr_real tt = clr_two_gap(within.tt, group.tt) + clr_fma(-apart, dt, f.between.tt);
+    const clr_real mt = clr_two_gap(within.mt, group.mt) + clr_fma(-apart, dm, f.between.mt);
+    f.cross = clr_fma(w.p.hi * clr_slope_of_regression(mt, tt), dt + f.control_error, f.cross);
+    return f;
+}
+
+// Of all batches, but for the line, which needs the third pass.
+CLR_FN clr_spread clr_spread_of_groups(clr_moments within, clr_two ratio, clr_folds f) {
+    clr_spread d;
+    const clr_residual inner = clr_residual_of(within, ratio);
+    d.mm = within.mm.hi + f.between.mm;
+    d.tt = within.tt.hi + f.between.tt;
+    d.mt = within.mt.hi + f.between.mt;
+    d.ratio.mm = inner.mm + f.between.ratio.mm;
+    d.ratio.mt = inner.mt + f.between.ratio.mt;
+    d.line = f.between.line;
+    return d;
+}
+
+CLR_NAMESPACE_END
+
+#endif
