@@ -118,10 +118,17 @@ CLR_FN clr_folds clr_fold(clr_folds f, clr_moments all, clr_quotient q, clr_mome
     return f;
 }
 
+// Of a group's mean from the line through the joint one. Means are seldom twice each other: then the first two are exact.
+CLR_FN clr_real clr_line_distance(clr_moments group, clr_moments all, clr_real slope) {
+    const clr_real dm = group.m.hi - all.m.hi, dt = group.t.hi - all.t.hi;
+    const clr_two p = clr_two_product(slope, dt);
+    return (dm - p.hi) + (clr_fma(-slope, group.t.lo - all.t.lo, group.m.lo - all.m.lo) - p.lo);
+}
+
 // `within`: the pooled moments; `slope`: of the regression over all batches.
 CLR_FN clr_folds clr_fold_line(clr_folds f, clr_moments within, clr_real slope, clr_moments group, clr_part w) {
     const clr_real dm = clr_two_gap(group.m, within.m), dt = clr_two_gap(group.t, within.t);
-    const clr_real off = clr_fma(-slope, dt, dm);
+    const clr_real off = clr_line_distance(group, within, slope);
     f.between.line = clr_fma(w.weight * off, off, f.between.line);
 
     const clr_real apart = w.apart * dt;

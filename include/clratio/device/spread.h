@@ -33,7 +33,7 @@ CLR_FN clr_real clr_slope_of_regression(clr_real mt, clr_real tt) {
     return flat ? (clr_real)(0.0f) : mt / (flat ? (clr_real)(1.0f) : tt);
 }
 
-// M2 about the line of this slope. Near the regression's own it is flat: a slope rounded to float costs 2^-48 of mm.
+// M2 about the line of this slope. It is least for the regression's own: a slope rounded to float costs 2^-48 of mm.
 CLR_FN clr_real clr_line_residual(clr_moments s, clr_real slope) {
     const clr_real zero = (clr_real)(0.0f), rest = clr_residual_of(s, clr_two_make(slope, zero)).mm;
     return rest > zero ? rest : rest * zero;
