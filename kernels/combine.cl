@@ -3,24 +3,60 @@
 // they do not need costs nothing, and nothing branches. One without it is for everything.
 #include "clratio/device/planes.h"
 
+#if CLR_GROUPED
+#define CLR_RUN 1
+#else
+#define CLR_RUN 8
+#endif
+
+// A run of vectors without gaps. Flags are rare: they are looked at once.
+CLR_FN void clr_combine_run(global const float* m, global const float* t, global const float* tau, const bool one_tau,
+                            global float* to, const bool past, uint zero_policy, clr_flag_tally* tally) {
+    clr_uint flags[CLR_RUN], some = (clr_uint)(0u);
+    for (uint k = 0; k < CLR_RUN; ++k) {
+        const uint at = k * CLR_WIDTH;
+        const clr_plain_ratio r = clr_read_means(clr_load(m + at), clr_load(t + at),
+                                                 one_tau ? (clr_real)(*tau) : clr_load(tau + at), zero_policy);
+        if (past)
+            clr_store_past(r.value, to + at);
+        else
+            clr_store(r.value, to + at);
+        flags[k] = r.flags;
+        some |= r.flags;
+    }
+    if (!clr_any(some != (clr_uint)(0u))) return;
+    for (uint k = 0; k < CLR_RUN; ++k) clr_count_flags(tally, flags[k], 0xffffffffu);
+}
+
+CLR_FN bool clr_is_packed(clr_layout view) { return view.stride == view.channels; }
+
 kernel void clr_combine(global const float* m, clr_layout m_layout, global const float* t, clr_layout t_layout,
                         global const float* tau, clr_layout tau_layout, global float* estimate, clr_layout estimate_layout,
                         global float* flags, global ulong* flag_rows, uint zero_policy, clr_range range) {
     const clr_layout packed = {0, 1, 1};
+    const bool one_tau = tau_layout.stride == 0 && tau_layout.channels == 1;
+    const bool runs = clr_is_packed(m_layout) && clr_is_packed(t_layout) && (one_tau || clr_is_packed(tau_layout)) &&
+                      estimate && clr_is_packed(estimate_layout) && !flags;
+    const bool past = runs && estimate != m && clr_goes_past(estimate, estimate_layout, range.count);
     clr_flag_tally tally = {{(clr_uint)(0u)}};
     const clr_span span = clr_my_span(range);
-    for (ulong v = span.begin; v < span.end; v += span.step) {
+    for (ulong v = span.begin; v < span.end;) {
         const ulong first = v * CLR_WIDTH;
+        if (runs && v + CLR_RUN <= span.end && first + CLR_RUN * CLR_WIDTH <= range.count) {
+            clr_combine_run(m + m_layout.offset + first, t + t_layout.offset + first,
+                            tau + tau_layout.offset + (one_tau ? 0 : first), one_tau, estimate + estimate_layout.offset + first,
+                            past, zero_policy, &tally);
+            v += CLR_RUN * span.step;
+            continue;
+        }
         const clr_plain_ratio r =
             clr_read_means(clr_load_view(m, m_layout, first, range.count), clr_load_view(t, t_layout, first, range.count),
                            clr_load_view(tau, tau_layout, first, range.count), zero_policy);
-        if (estimate == m)
-            clr_store_view(r.value, estimate, estimate_layout, first, range.count);
-        else if (estimate)
-            clr_store_apart(r.value, estimate, estimate_layout, first, range.count);
+        if (estimate) clr_store_view(r.value, estimate, estimate_layout, first, range.count);
         if (flags) clr_store_apart(clr_from_bits(r.flags), flags, packed, first, range.count);
         clr_count_flags(&tally, first + CLR_WIDTH <= range.count ? r.flags : r.flags & clr_lanes_below(first, range.count),
                         0xffffffffu);
+        v += span.step;
     }
     clr_store_flag_tally(&tally, flag_rows);
 }

@@ -85,19 +85,35 @@ CLR_FN void clr_store_view(clr_real v, global float* p, clr_layout view, ulong f
         clr_store_lanes(v, p, view.stride, view.channels, first, count);
 }
 
-// The same for a view that no kernel argument reads: a large one goes past the caches, which would read each line before it
-// is written.
-CLR_FN void clr_store_apart(clr_real v, global float* p, clr_layout view, ulong first, ulong count) {
-#if CLR_WIDTH == 32
-    global float* to = p + view.offset + first;
-    const bool large = count >= 1ul << 20, whole = view.stride == view.channels && first + CLR_WIDTH <= count;
-    if (large && whole && ((ulong)to & 63) == 0) {
-        __builtin_nontemporal_store(v.lo, (global float16*)to);
-        __builtin_nontemporal_store(v.hi, (global float16*)(to + 16));
-        return;
-    }
+#if defined(__clang__) && CLR_WIDTH >= 8
+#define CLR_PAST_ALIGNMENT (CLR_WIDTH == 8 ? 32 : 64)
+#else
+#define CLR_PAST_ALIGNMENT 0
 #endif
-    clr_store_view(v, p, view, first, count);
+
+// Whether whole vectors of a view that no kernel argument reads go past the caches, which would read each line before it
+// is written: large ones do.
+CLR_FN bool clr_goes_past(global const float* p, clr_layout view, ulong count) {
+    const ulong mask = CLR_PAST_ALIGNMENT - 1;
+    return CLR_PAST_ALIGNMENT != 0 && count >= 1ul << 20 && view.stride == view.channels && ((ulong)(p + view.offset) & mask) == 0;
+}
+
+CLR_FN void clr_store_past(clr_real v, global float* p) {
+#if CLR_PAST_ALIGNMENT && CLR_WIDTH == 32
+    __builtin_nontemporal_store(v.lo, (global float16*)p);
+    __builtin_nontemporal_store(v.hi, (global float16*)(p + 16));
+#elif CLR_PAST_ALIGNMENT
+    __builtin_nontemporal_store(v, (global clr_real*)p);
+#else
+    clr_store(v, p);
+#endif
+}
+
+CLR_FN void clr_store_apart(clr_real v, global float* p, clr_layout view, ulong first, ulong count) {
+    if (first + CLR_WIDTH <= count && clr_goes_past(p, view, count))
+        clr_store_past(v, p + view.offset + first);
+    else
+        clr_store_view(v, p, view, first, count);
 }
 
 #endif
