@@ -109,8 +109,9 @@ CLR_FN void clr_store_past(clr_real v, global float* p) {
 #endif
 }
 
+// Past the caches where one vector fills a line: half of one, with much other work before the next, would be slower.
 CLR_FN void clr_store_apart(clr_real v, global float* p, clr_layout view, ulong first, ulong count) {
-    if (first + CLR_WIDTH <= count && clr_goes_past(p, view, count))
+    if (CLR_WIDTH >= 16 && first + CLR_WIDTH <= count && clr_goes_past(p, view, count))
         clr_store_past(v, p + view.offset + first);
     else
         clr_store_view(v, p, view, first, count);
