@@ -482,6 +482,7 @@ CLR_FN clr_medium_sample clr_sample_uniform(clr_medium s, const clr_medium_ray* 
     clr_medium_sample out;
     out.x = u * ray->length;
     const clr_real phi = clr_phi(ray, out.x);
+    CLR_UNROLL
     for (int c = 0; c < 3; ++c) out.t[c] = plan->scale[c] * clr_exp2((clr_real)(-s.sigma[c] * CLR_LOG2_E) * phi);
     return out;
 }
@@ -495,6 +496,7 @@ CLR_FN clr_medium_sample clr_sample_distance(clr_u32 sampling, clr_medium s, con
     const clr_mask inside = x < ray->length;
     out.x = clr_clamp(x, (clr_real)(0.0f), ray->length);
     const clr_real phi = clr_phi(ray, out.x), back = (clr_real)(s.sigma_mean * CLR_LOG2_E) * out.x;
+    CLR_UNROLL
     for (int c = 0; c < 3; ++c) {
         const clr_real t = plan->scale[c] * clr_exp2(clr_fma((clr_real)(-s.sigma[c] * CLR_LOG2_E), phi, back));
         out.t[c] = sampling == CLR_DSA ? (inside ? t : (clr_real)(0.0f)) : t;
@@ -515,9 +517,11 @@ CLR_FN clr_medium_sample clr_sample_distance_mis(clr_medium s, const clr_medium_
     const clr_real phi = clr_phi(ray, out.x);
     const clr_real back = (clr_real)(s.sigma[0] * CLR_LOG2_E) * out.x;
     clr_real density = plan->low[0];
+    CLR_UNROLL
     for (int c = 1; c < 3; ++c)
         density = clr_fma(plan->low[c], clr_exp2(clr_fma((clr_real)(-s.sigma[c] * CLR_LOG2_E), out.x, back)), density);
     const clr_real inverse_density = clr_inverse_or_zero(density);
+    CLR_UNROLL
     for (int c = 0; c < 3; ++c)
         out.t[c] = plan->scale[c] * inverse_density * clr_exp2(clr_fma((clr_real)(-s.sigma[c] * CLR_LOG2_E), phi, back));
     return out;
@@ -552,6 +556,7 @@ CLR_FN clr_medium_sample clr_sample_wvds(float sigma, clr_medium s, const clr_me
     const clr_medium_place p = clr_place(ray, plan, u, in1, in2, line, (clr_real)(1.0f / sigma));
     clr_medium_sample out;
     out.x = p.x;
+    CLR_UNROLL
     for (int c = 0; c < 3; ++c) out.t[c] = plan->scale[c] * clr_exp2((clr_real)((sigma - s.sigma[c]) * CLR_LOG2_E) * p.phi);
     return out;
 }
@@ -564,6 +569,7 @@ CLR_FN clr_medium_sample clr_sample_wvds_mis(clr_medium s, const clr_medium_ray*
     const clr_mask in1 = u >= clr_pick(plan->piece_from[0][0], plan->piece_from[1][0], plan->piece_from[2][0], b, c2);
     const clr_mask in2 = u >= clr_pick(plan->piece_from[0][1], plan->piece_from[1][1], plan->piece_from[2][1], b, c2);
     clr_real slope[3], offset[3];
+    CLR_UNROLL
     for (int i = 0; i < 3; ++i) {
         slope[i] = clr_pick(plan->depth[0][i].slope, plan->depth[1][i].slope, plan->depth[2][i].slope, b, c2);
         offset[i] = clr_pick(plan->depth[0][i].offset, plan->depth[1][i].offset, plan->depth[2][i].offset, b, c2);
@@ -614,12 +620,14 @@ typedef struct {
 
 CLR_FN clr_light_place clr_sphere_place(const clr_shadows* shadows, clr_real x) {
     clr_light_place p;
+    CLR_UNROLL
     for (int k = 0; k < CLR_SPHERE_COORDINATES; ++k) p.c[k] = clr_fma(shadows->rate[k], x, shadows->base[k]);
     return p;
 }
 
 CLR_FN clr_light_place clr_box_place(const clr_shadows* shadows, clr_real x) {
     clr_light_place p;
+    CLR_UNROLL
     for (int k = 0; k < CLR_BOX_COORDINATES; ++k) p.c[k] = clr_fma(shadows->rate[3 + k], x, shadows->base[3 + k]);
     return p;
 }
@@ -632,17 +640,19 @@ CLR_FN clr_real clr_sphere_distance(clr_real across1, clr_real across2, clr_real
 }
 
 // Box: floats 6 to 17 are the least and the most of each difference of coordinates, the most of each coordinate (beyond it
-// the box lies behind), and the least of each where the light does not travel along it.
+// the box lies behind), and the least of each where the light does not travel along it. Signs of differences: comparisons
+// would be packed, and unpacked, on the way to one mask.
 CLR_FN clr_mask clr_in_box_shadow(clr_u32 axial, CLR_GLOBAL const float* box, const clr_light_place* least,
                                   const clr_light_place* most) {
-    clr_mask in = (most->c[0] >= (clr_real)(box[6])) & (least->c[0] <= (clr_real)(box[7]));
-    in = in & (most->c[1] >= (clr_real)(box[8])) & (least->c[1] <= (clr_real)(box[9]));
-    in = in & (most->c[2] >= (clr_real)(box[10])) & (least->c[2] <= (clr_real)(box[11]));
-    in = in & (least->c[3] <= (clr_real)(box[12])) & (least->c[4] <= (clr_real)(box[13]));
-    in = in & (least->c[5] <= (clr_real)(box[14]));
+    clr_uint off = (clr_uint)(0u);
+    CLR_UNROLL
+    for (int k = 0; k < 3; ++k) {
+        off = off | clr_bits(most->c[k] - (clr_real)(box[6 + 2 * k])) | clr_bits((clr_real)(box[7 + 2 * k]) - least->c[k]);
+        off = off | clr_bits((clr_real)(box[12 + k]) - least->c[3 + k]);
+    }
     if (axial)
-        for (int k = 0; k < 3; ++k) in = in & (most->c[3 + k] >= (clr_real)(box[15 + k]));
-    return in;
+        for (int k = 0; k < 3; ++k) off = off | clr_bits(most->c[3 + k] - (clr_real)(box[15 + k]));
+    return (off >> 31) == (clr_uint)(0u);
 }
 
 // The distance from c to the interval of two ends.
@@ -785,6 +795,7 @@ CLR_FN clr_medium_sums clr_add_samples(clr_u32 generator, clr_u32 sampling, clr_
         for (clr_u32 i = begin; i < end; ++i) {
             const clr_medium_sample one = clr_sample(sampling, s, ray, plan, clr_sample_u(sampler, i, w.w0, first));
             const clr_real lit = clr_lit(s, occluders, shadows, one.x);
+            CLR_UNROLL
             for (int c = 0; c < 3; ++c) {
                 sums.t[c] = sums.t[c] + one.t[c];
                 sums.m[c] = clr_fma(one.t[c], lit, sums.m[c]);

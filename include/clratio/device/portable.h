@@ -42,6 +42,11 @@
 #define CLR_RARE_FN static
 #define clr_prefetch(p) ((void)(p))
 #endif
+#if defined(__clang__)
+#define CLR_UNROLL _Pragma("unroll")  // short loops over arrays of vectors: PoCL would keep them, and the arrays, in memory
+#else
+#define CLR_UNROLL
+#endif
 #define CLR_CONSTANT constant
 #define CLR_GLOBAL global
 #define CLR_JOIN_(a, b) a##b
@@ -204,6 +209,7 @@ static inline clr_real clr_abs(clr_real x) { return (clr_real)(fabs(x.lo), fabs(
 
 #define CLR_WIDTH 1
 #define CLR_FP64 1
+#define CLR_UNROLL
 #define CLR_NAMESPACE_BEGIN namespace clratio::device {
 #define CLR_NAMESPACE_END }
 #define CLR_FN inline
