@@ -15,8 +15,8 @@ CLR_FN void clr_combine_run(global const float* m, global const float* t, global
     clr_uint flags[CLR_RUN], some = (clr_uint)(0u);
     for (uint k = 0; k < CLR_RUN; ++k) {
         const uint at = k * CLR_WIDTH;
-        const clr_plain_ratio r = clr_read_means(clr_load(m + at), clr_load(t + at),
-                                                 one_tau ? (clr_real)(*tau) : clr_load(tau + at), zero_policy);
+        const clr_plain_ratio r =
+            clr_read_means(clr_load(m + at), clr_load(t + at), one_tau ? (clr_real)(*tau) : clr_load(tau + at), zero_policy);
         if (past)
             clr_store_past(r.value, to + at);
         else
@@ -44,8 +44,8 @@ kernel void clr_combine(global const float* m, clr_layout m_layout, global const
         const ulong first = v * CLR_WIDTH;
         if (runs && v + CLR_RUN <= span.end && first + CLR_RUN * CLR_WIDTH <= range.count) {
             clr_combine_run(m + m_layout.offset + first, t + t_layout.offset + first,
-                            tau + tau_layout.offset + (one_tau ? 0 : first), one_tau, estimate + estimate_layout.offset + first,
-                            past, zero_policy, &tally);
+                            tau + tau_layout.offset + (one_tau ? 0 : first), one_tau,
+                            estimate + estimate_layout.offset + first, past, zero_policy, &tally);
             v += CLR_RUN * span.step;
             continue;
         }

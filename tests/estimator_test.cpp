@@ -241,7 +241,8 @@ TEST(Estimator, device_matches_the_reference_in_double) {
 
 namespace {
 
-/// Where sums over groups would cancel: m is a line in t up to 1e-3, a third of the values has t = 0, a third of them tau = 0.
+/// Where sums over groups would cancel: m is a line in t up to 1e-3, a third of the values has t = 0, a third of them tau =
+/// 0.
 Input near_a_line() {
     Samples draw(5);
     Input in;
@@ -273,7 +274,8 @@ TEST(Estimator, groups_together_say_what_all_batches_do) {
     for (const Estimator e : {Estimator::ratio, Estimator::mean, Estimator::beale, Estimator::regression}) {
         const CombineOptions options{.estimator = e, .standard_error = true, .bias = true, .gain = true};
         const Combined one = combine(moments_of(engine, in, {}), Tau(std::span<const float>(tau)), options);
-        const Combined five = combine(moments_of(engine, in, {.groups = group_count}), Tau(std::span<const float>(tau)), options);
+        const Combined five =
+            combine(moments_of(engine, in, {.groups = group_count}), Tau(std::span<const float>(tau)), options);
         std::size_t caught = 0;
         for (std::size_t i = 0; i < values; ++i) {
             Statistics within, all;

@@ -211,8 +211,8 @@ template <class Text> void print_rows(const Result& result, const std::vector<st
     }
     fmt::print("{}\n{}\n", head, line);
     for (const Row& row : result.rows) {
-        std::string cells = "| " + row.name + " |";
-        for (const auto n : at) cells += " " + (cell_at(row, n) ? text(*cell_at(row, n)) : std::string("-")) + " |";
+        std::string cells = fmt::format("| {} |", row.name);
+        for (const auto n : at) cells += fmt::format(" {} |", cell_at(row, n) ? text(*cell_at(row, n)) : std::string("-"));
         fmt::print("{}\n", cells);
     }
 }

@@ -74,9 +74,8 @@ Averages averages_of(const clratio::MediumScene& scene, std::uint64_t seeds) {
     Averages out{scene.frame(), pixels, seeds, {}};
     for (const auto sampling : compared) {
         std::vector<ImageErrors> of_seeds(seeds);
-        in_parallel(seeds, [&](std::size_t seed) {
-            of_seeds[seed] = errors_of(scene, sampling, seed, tau, reference, values);
-        });
+        in_parallel(seeds,
+                    [&](std::size_t seed) { of_seeds[seed] = errors_of(scene, sampling, seed, tau, reference, values); });
         const auto over_seeds = [&](std::uint32_t level, std::size_t order) {
             std::vector<double> squares, sums;
             for (const auto& one : of_seeds) {

@@ -95,7 +95,8 @@ CLR_FN void clr_store_view(clr_real v, global float* p, clr_layout view, ulong f
 // is written: large ones do.
 CLR_FN bool clr_goes_past(global const float* p, clr_layout view, ulong count) {
     const ulong mask = CLR_PAST_ALIGNMENT - 1;
-    return CLR_PAST_ALIGNMENT != 0 && count >= 1ul << 20 && view.stride == view.channels && ((ulong)(p + view.offset) & mask) == 0;
+    return CLR_PAST_ALIGNMENT != 0 && count >= 1ul << 20 && view.stride == view.channels &&
+           ((ulong)(p + view.offset) & mask) == 0;
 }
 
 CLR_FN void clr_store_past(clr_real v, global float* p) {
