@@ -3,6 +3,8 @@
 // they do not need costs nothing, and nothing branches. One without it is for everything.
 #include "clratio/device/planes.h"
 
+#define CLR_ALL_FLAGS 0xffffffffu
+
 #if CLR_GROUPED
 #define CLR_RUN 1
 #else
@@ -25,7 +27,7 @@ CLR_FN void clr_combine_run(global const float* m, global const float* t, global
         some |= r.flags;
     }
     if (!clr_any(some != (clr_uint)(0u))) return;
-    for (uint k = 0; k < CLR_RUN; ++k) clr_count_flags(tally, flags[k], 0xffffffffu);
+    for (uint k = 0; k < CLR_RUN; ++k) clr_count_flags(tally, flags[k], CLR_ALL_FLAGS);
 }
 
 CLR_FN bool clr_is_packed(clr_layout view) { return view.stride == view.channels; }
@@ -55,10 +57,10 @@ kernel void clr_combine(global const float* m, clr_layout m_layout, global const
         if (estimate) clr_store_view(r.value, estimate, estimate_layout, first, range.count);
         if (flags) clr_store_apart(clr_from_bits(r.flags), flags, packed, first, range.count);
         clr_count_flags(&tally, first + CLR_WIDTH <= range.count ? r.flags : r.flags & clr_lanes_below(first, range.count),
-                        0xffffffffu);
+                        CLR_ALL_FLAGS);
         v += span.step;
     }
-    clr_store_flag_tally(&tally, flag_rows);
+    clr_store_flag_tally(&tally, CLR_ALL_FLAGS, flag_rows);
 }
 
 CLR_FN clr_state clr_state_of(const clr_groups* groups, uint g) {
@@ -124,14 +126,15 @@ CLR_FN clr_record clr_weigh(clr_planes base, const clr_groups* groups, clr_whole
     return all;
 }
 
-CLR_FN clr_record clr_pool_groups(clr_record all, clr_planes base, const clr_groups* groups, clr_whole whole, ulong i) {
+CLR_FN clr_record clr_pool_groups(clr_record all, clr_planes base, const clr_groups* groups, clr_whole whole,
+                                  clr_question ask, ulong i) {
     all.moments = clr_moments_none();
     all.ratios = clr_ratios_none();
     for (uint g = 0; g < groups->count; ++g) {
         if (groups->of[g].batches == 0) continue;
         const clr_record group = clr_load_group(base, groups, g, i);
         const clr_part part = clr_part_in(groups, g, group, whole);
-        clr_prefetch_moments(base, clr_state_of(groups, g), i + CLR_TILE);
+        clr_prefetch_planes(base, clr_state_of(groups, g), ask.estimator, i + CLR_TILE);
         all.moments = clr_pool(all.moments, group.moments, part.p);
         all.ratios = clr_pool_ratios(all.ratios, group.ratios, part.p);
     }
@@ -142,7 +145,7 @@ CLR_FN clr_joint clr_join(clr_planes base, const clr_groups* groups, clr_whole w
                           clr_question ask, ulong i) {
     clr_record all = clr_load_group(base, groups, 0, i);
     if (clr_weighs_values(groups)) all = clr_weigh(base, groups, &whole, i);
-    all = clr_pool_groups(all, base, groups, whole, i);
+    all = clr_pool_groups(all, base, groups, whole, ask, i);
     clr_joint j = clr_joint_means(all, whole, tau, ask.zero_policy);
     for (uint g = 0; g < groups->count; ++g) {
         if (groups->of[g].batches == 0) continue;
@@ -168,6 +171,7 @@ CLR_FN clr_whole clr_whole_of_all(const clr_groups* groups) { return clr_whole_o
 
 CLR_FN clr_joint clr_join(clr_planes base, const clr_groups* groups, clr_whole whole, clr_evidence n, clr_real tau,
                           clr_question ask, ulong i) {
+    clr_prefetch_planes(base, clr_state_of(groups, 0), ask.estimator, i + 8 * CLR_TILE);
     return clr_joint_of(clr_load_group(base, groups, 0, i), n, tau, ask.zero_policy);
 }
 
@@ -199,5 +203,5 @@ kernel void clr_combine_moments(CLR_PLANE_ARGUMENTS(s), clr_groups groups, CLR_R
             clr_read_out(j, reading.added, control, clr_quantile_for(j.all.batches, reading, quantiles), ask);
         clr_write_reading(e, reading, ask.outputs, to, &tally, first, range.count);
     }
-    clr_store_flag_tally(&tally, flag_rows);
+    clr_store_flag_tally(&tally, ask.counted, flag_rows);
 }

@@ -265,7 +265,7 @@ kernel void clr_add_and_combine(CLR_EACH_BATCH(CLR_BATCH_ARGUMENTS) clr_batches 
     CLR_MAKE_READER(a)
     clr_add_and_read(true, &a, &reader, clr_my_span(range));
     clr_store_add_tally(&a, add_rows);
-    clr_store_flag_tally(&reader.tally, flag_rows);
+    clr_store_flag_tally(&reader.tally, reading.ask.counted, flag_rows);
 }
 
 #else
@@ -280,7 +280,7 @@ kernel void clr_combine_batches(CLR_EACH_BATCH(CLR_BATCH_ARGUMENTS) clr_batches 
     CLR_MAKE_READER(a)
     clr_add_and_read(false, &a, &reader, clr_my_span(range));
     clr_store_add_tally(&a, add_rows);
-    clr_store_flag_tally(&reader.tally, flag_rows);
+    clr_store_flag_tally(&reader.tally, reading.ask.counted, flag_rows);
 }
 
 #endif

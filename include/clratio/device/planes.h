@@ -125,9 +125,15 @@ CLR_FN void clr_prefetch_two(global const float* p, clr_state s, ulong i) {
     for (int k = 0; k < 2 * CLR_WIDTH; k += 16) clr_prefetch(p + k);
 }
 
-// Several planes are more streams than a processor fetches ahead by itself. i may lie past the end.
-CLR_FN void clr_prefetch_moments(clr_planes p, clr_state s, ulong i) {
+// The planes of an estimator: several are more streams than a processor fetches ahead by itself. i may lie past the end.
+CLR_FN void clr_prefetch_planes(clr_planes p, clr_state s, clr_u32 estimator, ulong i) {
     clr_prefetch_two(p.m, s, i);
+    if (clr_uses_ratios(estimator)) {
+        clr_prefetch_two(p.quotient, s, i);
+        clr_prefetch_two(p.zero_m, s, i);
+        clr_prefetch_two(p.zero_share, s, i);
+    }
+    if (estimator == CLR_ESTIMATOR_MEAN || estimator == CLR_ESTIMATOR_MEAN_OF_RATIOS) return;
     clr_prefetch_two(p.t, s, i);
     clr_prefetch_two(p.mm, s, i);
     clr_prefetch_two(p.tt, s, i);
@@ -203,18 +209,32 @@ CLR_FN clr_uint clr_lanes_below(ulong first, ulong count) {
     return clr_load(lane);
 }
 
+// Neighbours mostly have the same flags: vectors that do are counted together. All 0 to begin with.
 typedef struct {
-    clr_uint of[CLR_TALLY_FLAGS];
+    clr_uint of[CLR_TALLY_FLAGS], last;
+    uint times;  // how often `last` came and is not yet counted
 } clr_flag_tally;
 
-CLR_FN void clr_count_flags(clr_flag_tally* tally, clr_uint flags, uint counted) {
-    if (!clr_any(flags != (clr_uint)(0u))) return;
-    for (uint bit = 0; bit < CLR_FLAG_BITS; ++bit) tally->of[bit] += (flags >> bit) & (clr_uint)(1u);
-    tally->of[CLR_FLAG_BITS] += (flags & (clr_uint)(counted)) != (clr_uint)(0u) ? (clr_uint)(1u) : (clr_uint)(0u);
+CLR_FN void clr_settle_flags(clr_flag_tally* tally, uint counted) {
+    const clr_uint times = (clr_uint)(tally->times), zero = (clr_uint)(0u);
+    tally->times = 0;
+    if (!clr_any(tally->last != zero)) return;
+    for (uint bit = 0; bit < CLR_FLAG_BITS; ++bit)
+        tally->of[bit] += (tally->last & (clr_uint)(1u << bit)) != zero ? times : zero;
+    tally->of[CLR_FLAG_BITS] += (tally->last & (clr_uint)(counted)) != zero ? times : zero;
 }
 
-CLR_FN void clr_store_flag_tally(const clr_flag_tally* tally, global ulong* rows) {
+CLR_FN void clr_count_flags(clr_flag_tally* tally, clr_uint flags, uint counted) {
+    if (clr_any(flags != tally->last)) {
+        clr_settle_flags(tally, counted);
+        tally->last = flags;
+    }
+    ++tally->times;
+}
+
+CLR_FN void clr_store_flag_tally(clr_flag_tally* tally, uint counted, global ulong* rows) {
     if (!rows) return;
+    clr_settle_flags(tally, counted);
     for (uint k = 0; k < CLR_TALLY_FLAGS; ++k) rows[get_global_id(0) * CLR_TALLY_FLAGS + k] = clr_sum_lanes(tally->of[k]);
 }
 
