@@ -21,7 +21,8 @@ Mix mix_of(Estimator e) {
     if (e == Estimator::mean) return {4, 2};
     if (e == Estimator::mean_of_ratios) return {7, 1};
     if (e == Estimator::hartley_ross) return {13, 2};
-    return {10 * options_for(e).groups + 1, 2};
+    const std::uint32_t planes = e == Estimator::jackknife ? 4 : 10;  // its error is that of the groups' means
+    return {planes * options_for(e).groups + 1, 2};
 }
 
 std::uint64_t bytes_moved(std::uint64_t n, Estimator e) { return 4 * n * (mix_of(e).reads + mix_of(e).writes); }

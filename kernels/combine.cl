@@ -126,6 +126,12 @@ CLR_FN clr_record clr_weigh(clr_planes base, const clr_groups* groups, clr_whole
     return all;
 }
 
+CLR_FN clr_moments clr_pool_all_within(clr_moments all, clr_planes base, const clr_groups* groups, ulong i) {
+    for (uint g = 0; g < groups->count; ++g)
+        if (groups->of[g].batches != 0) all = clr_pool_within(all, clr_load_group(base, groups, g, i).moments);
+    return clr_moments_settle(all);
+}
+
 CLR_FN clr_record clr_pool_groups(clr_record all, clr_planes base, const clr_groups* groups, clr_whole whole,
                                   clr_question ask, ulong i) {
     all.moments = clr_moments_none();
@@ -134,8 +140,9 @@ CLR_FN clr_record clr_pool_groups(clr_record all, clr_planes base, const clr_gro
         if (groups->of[g].batches == 0) continue;
         const clr_record group = clr_load_group(base, groups, g, i);
         const clr_part part = clr_part_in(groups, g, group, whole);
-        clr_prefetch_planes(base, clr_state_of(groups, g), ask.estimator, i + CLR_TILE);
-        all.moments = clr_pool(all.moments, group.moments, part.p);
+        clr_prefetch_planes(base, clr_state_of(groups, g), ask, i + CLR_TILE);
+        all.moments = clr_pool_means(all.moments, group.moments, part.p);
+        if (clr_asks_within(ask)) all.moments = clr_pool_within(all.moments, group.moments);
         all.ratios = clr_pool_ratios(all.ratios, group.ratios, part.p);
     }
     return all;
@@ -152,6 +159,9 @@ CLR_FN clr_joint clr_join(clr_planes base, const clr_groups* groups, clr_whole w
         const clr_record group = clr_load_group(base, groups, g, i);
         j.folds = clr_fold(j.folds, j.all.moments, j.q, group.moments, clr_part_in(groups, g, group, whole));
     }
+    // A jackknife that falls back has the error of the ratio.
+    if (!clr_asks_within(ask) && clr_any(clr_falls_back(j, ask.estimator) || j.q.empty))
+        j.all.moments = clr_pool_all_within(j.all.moments, base, groups, i);
     j.spread = clr_spread_of_groups(j.all.moments, j.q.quotient, j.folds);
     j.n = n;
     if (!clr_asks_line(ask)) return j;
@@ -171,7 +181,7 @@ CLR_FN clr_whole clr_whole_of_all(const clr_groups* groups) { return clr_whole_o
 
 CLR_FN clr_joint clr_join(clr_planes base, const clr_groups* groups, clr_whole whole, clr_evidence n, clr_real tau,
                           clr_question ask, ulong i) {
-    clr_prefetch_planes(base, clr_state_of(groups, 0), ask.estimator, i + 8 * CLR_TILE);
+    clr_prefetch_planes(base, clr_state_of(groups, 0), ask, i + 8 * CLR_TILE);
     return clr_joint_of(clr_load_group(base, groups, 0, i), n, tau, ask.zero_policy);
 }
 

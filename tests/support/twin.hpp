@@ -55,7 +55,7 @@ inline device::clr_joint join_twin(std::span<const TwinValue> groups, float tau,
     all.moments = clr_moments_none();
     all.ratios = clr_ratios_none();
     for (const auto& g : groups) {
-        all.moments = clr_pool(all.moments, g.record.moments, part(g).p);
+        all.moments = clr_pool_within(clr_pool_means(all.moments, g.record.moments, part(g).p), g.record.moments);
         all.ratios = clr_pool_ratios(all.ratios, g.record.ratios, part(g).p);
     }
     clr_joint j = clr_joint_means(all, whole, tau, ask.zero_policy);

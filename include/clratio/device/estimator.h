@@ -192,6 +192,12 @@ typedef struct {
     clr_evidence n;
 } clr_joint;
 
+// Whether the scatter within groups is asked for. The jackknife's own error needs the groups' means alone.
+CLR_FN bool clr_asks_within(clr_question ask) {
+    return ask.estimator != CLR_ESTIMATOR_JACKKNIFE ||
+           (ask.outputs & (CLR_WRITE_BIAS | CLR_WRITE_INTERVAL | CLR_WRITE_GAIN)) != 0;
+}
+
 // But for the sums over groups, the spread and the evidence.
 CLR_FN clr_joint clr_joint_means(clr_record all, clr_whole whole, clr_real tau, clr_u32 zero_policy) {
     clr_joint j;

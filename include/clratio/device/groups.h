@@ -1,6 +1,6 @@
 // What the groups of a value's batches say together, and what estimators take from one group after the other. Three passes
-// over the groups: clr_pool joins them, clr_fold measures them against the joint means and the ratio, and clr_fold_line
-// against the regression line. Only what cancels is two-float.
+// over the groups: clr_pool_means and clr_pool_within join them, clr_fold measures them against the joint means and the
+// ratio, and clr_fold_line against the regression line. Only what cancels is two-float.
 #ifndef CLRATIO_DEVICE_GROUPS_H
 #define CLRATIO_DEVICE_GROUPS_H
 
@@ -53,10 +53,15 @@ CLR_FN clr_whole clr_count_part(clr_whole all, clr_part w) {
 
 // ---- the first pass
 
-// Joint means, and sums of the second moments within groups: loose pairs.
-CLR_FN clr_moments clr_pool(clr_moments all, clr_moments group, clr_two p) {
+// Loose pairs.
+CLR_FN clr_moments clr_pool_means(clr_moments all, clr_moments group, clr_two p) {
     all.m = clr_two_gather(all.m, clr_two_times(group.m, p));
     all.t = clr_two_gather(all.t, clr_two_times(group.t, p));
+    return all;
+}
+
+// The second moments within groups, likewise.
+CLR_FN clr_moments clr_pool_within(clr_moments all, clr_moments group) {
     all.mm = clr_two_gather(all.mm, group.mm);
     all.tt = clr_two_gather(all.tt, group.tt);
     all.mt = clr_two_gather(all.mt, group.mt);

@@ -126,15 +126,16 @@ CLR_FN void clr_prefetch_two(global const float* p, clr_state s, ulong i) {
 }
 
 // The planes of an estimator: several are more streams than a processor fetches ahead by itself. i may lie past the end.
-CLR_FN void clr_prefetch_planes(clr_planes p, clr_state s, clr_u32 estimator, ulong i) {
+CLR_FN void clr_prefetch_planes(clr_planes p, clr_state s, clr_question ask, ulong i) {
     clr_prefetch_two(p.m, s, i);
-    if (clr_uses_ratios(estimator)) {
+    if (clr_uses_ratios(ask.estimator)) {
         clr_prefetch_two(p.quotient, s, i);
         clr_prefetch_two(p.zero_m, s, i);
         clr_prefetch_two(p.zero_share, s, i);
     }
-    if (estimator == CLR_ESTIMATOR_MEAN || estimator == CLR_ESTIMATOR_MEAN_OF_RATIOS) return;
+    if (ask.estimator == CLR_ESTIMATOR_MEAN || ask.estimator == CLR_ESTIMATOR_MEAN_OF_RATIOS) return;
     clr_prefetch_two(p.t, s, i);
+    if (!clr_asks_within(ask)) return;
     clr_prefetch_two(p.mm, s, i);
     clr_prefetch_two(p.tt, s, i);
     clr_prefetch_two(p.mt, s, i);
