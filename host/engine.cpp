@@ -166,6 +166,7 @@ Engine::Engine(EngineOptions options) : state_(std::make_shared<State>()) {
     check(code, "clCreateCommandQueue");
     choose_shape(s);
     refuse_other_bits(*this);
+    save_at_exit(state_);
 }
 
 Engine::Engine(cl_command_queue queue, EngineOptions options) : state_(std::make_shared<State>()) {
@@ -180,6 +181,7 @@ Engine::Engine(cl_command_queue queue, EngineOptions options) : state_(std::make
     s.info = describe(number<cl_platform_id>(s.device, CL_DEVICE_PLATFORM), s.device);
     choose_shape(s);
     refuse_other_bits(*this);
+    save_at_exit(state_);
 }
 
 const DeviceInfo& Engine::info() const { return state_->info; }

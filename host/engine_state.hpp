@@ -2,7 +2,9 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <mutex>
+#include <thread>
 
 #include "clratio/engine.hpp"
 #include "opencl.hpp"
@@ -11,6 +13,8 @@ namespace clratio {
 
 struct Engine::State {
     ~State();  ///< keeps binaries of programs built here in the disk cache: not while anyone waits for a result
+
+    std::thread::id maker = std::this_thread::get_id();  ///< the only thread that keeps them
 
     Context context;
     Queue queue;
@@ -29,6 +33,10 @@ struct Engine::State {
     };
     std::map<std::string, Built> programs;  ///< by word, width and build options
 };
+
+/// Of an engine that the program exits with, binaries are kept then, while the driver is whole: its static parts may go
+/// before a static engine.
+void save_at_exit(const std::shared_ptr<Engine::State>& state);
 
 /// The program of kernels/WORD.cl: from memory, from the disk cache, or built now.
 Program program(Engine::State& state, const std::string& word, int width, const std::string& options);

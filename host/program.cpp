@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <chrono>
 #include <set>
+#include <thread>
 
 #include "cache.hpp"
 #include "embedded.hpp"
@@ -150,14 +151,44 @@ void save_binaries(const Engine::State& s) {
     }
 }
 
-}  // namespace
-
-Engine::State::~State() {
+void save_quietly(const Engine::State& s) {
     try {
-        save_binaries(*this);
+        save_binaries(s);
     } catch (...) {
         // A cache may fail in silence.
     }
+}
+
+const std::thread::id main_thread = std::this_thread::get_id();
+enum class Exit { unknown, to_come, begun } program_exit = Exit::unknown;  // of the main thread
+
+bool on_main_thread() { return std::this_thread::get_id() == main_thread; }
+
+/// The main thread's: it goes when the program exits, before anything static, the driver's parts among them.
+struct Keeper {
+    std::vector<std::weak_ptr<Engine::State>> engines;
+
+    ~Keeper() {
+        program_exit = Exit::begun;
+        for (const auto& engine : engines)
+            if (const auto s = engine.lock()) save_quietly(*s);
+    }
+};
+
+}  // namespace
+
+void save_at_exit(const std::shared_ptr<Engine::State>& s) {
+    if (!on_main_thread()) return;
+    static thread_local Keeper keeper;
+    program_exit = Exit::to_come;
+    std::erase_if(keeper.engines, [](const auto& engine) { return engine.expired(); });
+    keeper.engines.push_back(s);
+}
+
+Engine::State::~State() {
+    if (std::this_thread::get_id() != maker) return;
+    if (on_main_thread() && program_exit != Exit::to_come) return;
+    save_quietly(*this);
 }
 
 }  // namespace clratio

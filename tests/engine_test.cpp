@@ -209,6 +209,22 @@ TEST(Cache, a_disk_that_takes_nothing_is_no_error) {
     EXPECT_EQ(small_job(Engine()), small_answer);
 }
 
+// The driver's own static parts may go before the engine does: nothing may be asked of them then.
+TEST(Cache, programs_of_a_static_engine_are_kept_at_exit) {
+    testing::GTEST_FLAG(death_test_style) = "threadsafe";  // the process begins anew, in this test
+    const char* given = std::getenv("CLRATIO_TEST_FOLDER");
+    std::optional<Scratch> scratch;
+    if (!given) scratch.emplace();
+    const std::string folder = given ? given : *scratch / ".";
+    const Environment shared("CLRATIO_TEST_FOLDER", folder), set("XDG_CACHE_HOME", folder), pocl("POCL_CACHE_DIR", folder);
+    const auto leave = [] {
+        static const Engine engine;
+        std::exit(small_job(engine) == small_answer ? 0 : 1);
+    };
+    EXPECT_EXIT(leave(), testing::ExitedWithCode(0), "");
+    EXPECT_EQ(entries(std::filesystem::path(folder) / "clratio").size(), 1u);
+}
+
 TEST(Cache, a_second_engine_starts_from_the_file_and_a_damaged_one_is_rebuilt) {
     const Scratch scratch;
     const Environment set("XDG_CACHE_HOME", scratch / ".");
