@@ -171,7 +171,7 @@ CLR_FN clr_joint clr_join(clr_planes base, const clr_groups* groups, clr_whole w
         const clr_record group = clr_load_group(base, groups, g, i);
         j.folds = clr_fold_line(j.folds, j.all.moments, slope, group.moments, clr_part_in(groups, g, group, whole));
     }
-    j.spread.line = clr_line_residual(j.all.moments, slope) + j.folds.between.line;
+    j.spread.line = clr_line_of_groups(j.all.moments, slope, j.folds);
     return j;
 }
 

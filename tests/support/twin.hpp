@@ -63,7 +63,7 @@ inline device::clr_joint join_twin(std::span<const TwinValue> groups, float tau,
     j.spread = clr_spread_of_groups(j.all.moments, j.q.quotient, j.folds);
     const float slope = clr_slope_of_regression(j.spread.mt, j.spread.tt);
     for (const auto& g : groups) j.folds = clr_fold_line(j.folds, j.all.moments, slope, g.record.moments, part(g));
-    j.spread.line = clr_line_residual(j.all.moments, slope) + j.folds.between.line;
+    j.spread.line = clr_line_of_groups(j.all.moments, slope, j.folds);
     j.n = n;
     return j;
 }

@@ -143,6 +143,11 @@ CLR_FN clr_folds clr_fold_line(clr_folds f, clr_moments within, clr_real slope, 
     return f;
 }
 
+// M2 about the line, after the third pass.
+CLR_FN clr_real clr_line_of_groups(clr_moments within, clr_real slope, clr_folds f) {
+    return clr_line_residual(within, slope) + f.between.line;
+}
+
 // Of all batches, but for the line, which needs the third pass.
 CLR_FN clr_spread clr_spread_of_groups(clr_moments within, clr_two ratio, clr_folds f) {
     clr_spread d;
@@ -152,7 +157,7 @@ CLR_FN clr_spread clr_spread_of_groups(clr_moments within, clr_two ratio, clr_fo
     d.mt = within.mt.hi + f.between.mt;
     d.ratio.mm = inner.mm + f.between.ratio.mm;
     d.ratio.mt = inner.mt + f.between.ratio.mt;
-    d.line = f.between.line;
+    d.line = (clr_real)(0.0f);
     return d;
 }
 
