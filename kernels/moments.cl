@@ -32,7 +32,7 @@ CLR_FN bool clr_skips(const clr_adder* a) { return (a->state.options & CLR_STATE
 // other, and few streams run through memory at a time. GPUs keep one vector in registers.
 #if CLR_GROUPED
 #define CLR_BLOCK 1
-#elif CLR_WIDTH == 32
+#elif CLR_WIDTH >= 16
 #define CLR_BLOCK 16
 #else
 #define CLR_BLOCK 32
@@ -54,8 +54,6 @@ CLR_FN bool clr_in_doubt(clr_moments s, clr_real lost) {
     return clr_any(clr_fma(s.m.hi, zero, clr_fma(s.t.hi, zero, lost)) != zero);
 }
 
-CLR_FN clr_real clr_lesser(clr_real a, clr_real b) { return a < b ? a : b; }
-
 CLR_FN clr_state clr_grown(const clr_adder* a) {
     const clr_batch last = a->batches->of[a->batches->count - 1];
     const clr_group group = {a->state.group.batches + a->batches->count, last.sum_hi, last.sum_lo, last.sum2_hi,
@@ -74,23 +72,38 @@ CLR_FN void clr_put_back(clr_moments moments, const clr_adder* a, ulong at) {
                        a->planes, a->state, at);
 }
 
+// What vector v of the next block begins with, while batch k goes over this one: the batch's values, and the plane of the
+// state whose turn it is. Any address will do.
+CLR_FN void clr_prefetch_next(const bool with_plane, uint k, uint v, const clr_adder* a, ulong first) {
+    const ulong next = first + (CLR_BLOCK + v) * CLR_WIDTH;
+    const clr_planes p = a->planes;
+    global const float* plane = k == 1 ? p.m : k == 2 ? p.t : k == 3 ? p.mm : k == 4 ? p.tt : k == 5 ? p.mt : 0;
+    if (with_plane && plane) clr_prefetch_two(plane, a->state, next);
+    if (v * CLR_WIDTH % CLR_LINE) return;
+    for (uint c = 0; c < CLR_WIDTH; c += CLR_LINE) {
+        clr_prefetch(a->m[k] + a->batches->of[k].m.offset + next + c);
+        clr_prefetch(a->t[k] + a->batches->of[k].t.offset + next + c);
+    }
+}
+
 // Batch k over a block of whole vectors of contiguous values. The first pass takes the state from the planes. The last one
 // puts it back, save for vectors in doubt, of which it gives a bit each.
 CLR_FN uint clr_pass(const bool is_first, const bool is_last, uint k, clr_block* block, const clr_adder* a, ulong first,
-                     clr_real* least) {
+                     clr_uint* all_signs) {
     const clr_batch batch = a->batches->of[k];
     global const float* m_from = a->m[k] + batch.m.offset + first;
     global const float* t_from = a->t[k] + batch.t.offset + first;
     const clr_entry e = clr_entry_of(&batch);
     const uint index = a->state.group.batches + k;
-    clr_real low = *least;
+    clr_uint signs = *all_signs;
     uint doubtful = 0;
     for (uint v = 0; v < CLR_BLOCK; ++v) {
         const ulong at = first + v * CLR_WIDTH;
         const clr_real m = clr_load(m_from + v * CLR_WIDTH), t = clr_load(t_from + v * CLR_WIDTH);
+        clr_prefetch_next(!is_first && !is_last, k, v, a, first);
         const clr_moments before = is_first ? clr_load_moments(a->planes, a->state, at) : block->moments[v];
         const clr_moments moments = clr_moments_add(before, m, t, e, index);
-        low = clr_lesser(m, clr_lesser(t, low));
+        signs |= clr_bits(m) | clr_bits(t);
         if (!is_last)
             block->moments[v] = moments;
         else if (clr_skips(a) && clr_in_doubt(moments, clr_lost_before(a->planes, a->state, at)))
@@ -98,7 +111,7 @@ CLR_FN uint clr_pass(const bool is_first, const bool is_last, uint k, clr_block*
         else
             clr_put_back(moments, a, at);
     }
-    *least = low;
+    *all_signs = signs;
     return doubtful;
 }
 
@@ -116,29 +129,29 @@ CLR_FN void clr_count_negative(clr_adder* a, ulong first) {
 // A bit for each vector that is left to clr_add_vector.
 CLR_FN uint clr_add_block(clr_adder* a, ulong first) {
     clr_block block;
-    clr_real least = (clr_real)(0.0f);
+    clr_uint signs = (clr_uint)(0u);
     uint doubtful;
     const uint last = a->batches->count - 1;
     if (last == 0) {
-        doubtful = clr_pass(true, true, 0, &block, a, first, &least);
+        doubtful = clr_pass(true, true, 0, &block, a, first, &signs);
     } else {
-        clr_pass(true, false, 0, &block, a, first, &least);
-        for (uint k = 1; k < last; ++k) clr_pass(false, false, k, &block, a, first, &least);
-        doubtful = clr_pass(false, true, last, &block, a, first, &least);
+        clr_pass(true, false, 0, &block, a, first, &signs);
+        for (uint k = 1; k < last; ++k) clr_pass(false, false, k, &block, a, first, &signs);
+        doubtful = clr_pass(false, true, last, &block, a, first, &signs);
     }
-    if (clr_any(least < (clr_real)(0.0f))) clr_count_negative(a, first);
+    if (clr_any(signs >= (clr_uint)(0x80000000u))) clr_count_negative(a, first);
     return doubtful;
 }
 
 // The same for a block that stays. Of no state it is one pass over and over: a small program is loaded sooner.
 CLR_FN uint clr_fill_block(const bool keeps, clr_block* block, clr_adder* a, ulong first) {
-    clr_real least = (clr_real)(0.0f);
+    clr_uint signs = (clr_uint)(0u);
     if (keeps)
-        clr_pass(true, false, 0, block, a, first, &least);
+        clr_pass(true, false, 0, block, a, first, &signs);
     else
         for (uint v = 0; v < CLR_BLOCK; ++v) block->moments[v] = clr_moments_none();
-    for (uint k = keeps ? 1 : 0; k < a->batches->count; ++k) clr_pass(false, false, k, block, a, first, &least);
-    if (clr_any(least < (clr_real)(0.0f))) clr_count_negative(a, first);
+    for (uint k = keeps ? 1 : 0; k < a->batches->count; ++k) clr_pass(false, false, k, block, a, first, &signs);
+    if (clr_any(signs >= (clr_uint)(0x80000000u))) clr_count_negative(a, first);
     uint doubtful = 0;
     for (uint v = 0; clr_skips(a) && v < CLR_BLOCK; ++v) {
         const clr_real lost = keeps ? clr_lost_before(a->planes, a->state, first + v * CLR_WIDTH) : (clr_real)(0.0f);

@@ -119,10 +119,12 @@ CLR_FN clr_moments clr_load_moments(clr_planes p, clr_state s, ulong i) {
     return r;
 }
 
-// A vector's share of a tile's hi and lo parts, each cache line of 16 floats once.
+#define CLR_LINE 16  // floats of a cache line
+
+// A vector's share of a tile's hi and lo parts, each cache line once.
 CLR_FN void clr_prefetch_two(global const float* p, clr_state s, ulong i) {
     p += (i / CLR_TILE * s.groups + s.place) * (2 * CLR_TILE) + i % CLR_TILE * 2;
-    for (int k = 0; k < 2 * CLR_WIDTH; k += 16) clr_prefetch(p + k);
+    for (int k = 0; k < 2 * CLR_WIDTH; k += CLR_LINE) clr_prefetch(p + k);
 }
 
 // The planes of an estimator: several are more streams than a processor fetches ahead by itself. i may lie past the end.
