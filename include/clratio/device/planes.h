@@ -124,6 +124,7 @@ CLR_FN clr_moments clr_load_moments(clr_planes p, clr_state s, ulong i) {
 // A vector's share of a tile's hi and lo parts, each cache line once.
 CLR_FN void clr_prefetch_two(global const float* p, clr_state s, ulong i) {
     p += (i / CLR_TILE * s.groups + s.place) * (2 * CLR_TILE) + i % CLR_TILE * 2;
+    CLR_UNROLL
     for (int k = 0; k < 2 * CLR_WIDTH; k += CLR_LINE) clr_prefetch(p + k);
 }
 
