@@ -351,7 +351,9 @@ TEST(State, the_verdict_sees_a_writer_that_does_not_rename) {
         std::ofstream out(path, std::ios::binary);
         for (const char byte : bytes_of(other)) out.put(byte).flush();
     };
-    EXPECT_GT(kill_writers(1, 30, path, in_place).wrong, 5u);
+    std::size_t wrong = 0;  // on a busy machine few kills meet a writer at work
+    for (std::uint64_t seed = 1; wrong <= 5 && seed <= 10; ++seed) wrong += kill_writers(seed, 30, path, in_place).wrong;
+    EXPECT_GT(wrong, 5u);
 }
 
 TEST(State, the_verdict_sees_a_writer_that_counts_wrongly) {

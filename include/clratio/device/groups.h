@@ -55,8 +55,8 @@ CLR_FN clr_whole clr_count_part(clr_whole all, clr_part w) {
 
 // Loose pairs.
 CLR_FN clr_moments clr_pool_means(clr_moments all, clr_moments group, clr_two p) {
-    all.m = clr_two_gather(all.m, clr_two_times(group.m, p));
-    all.t = clr_two_gather(all.t, clr_two_times(group.t, p));
+    all.m = clr_two_gather_times(all.m, group.m, p);
+    all.t = clr_two_gather_times(all.t, group.t, p);
     return all;
 }
 

@@ -32,7 +32,7 @@ CLR_FN clr_entry clr_entry_make(clr_two weight, clr_two added, clr_two sum) {
     return e;
 }
 
-// Sums stay loose pairs over this many batches of a state, and are settled after: a settled sum costs 3 operations of 11.
+// Sums stay loose pairs over this many batches of a state, and are settled after, for 3 operations more.
 #define CLR_BATCHES_BETWEEN_SETTLING 8u
 
 // Whether batch number `index`, counted from 0 over the life of the state, is one that settles.
@@ -58,11 +58,11 @@ CLR_FN clr_moments clr_moments_settle(clr_moments s) {
 CLR_FN clr_moments clr_moments_move(clr_moments s, clr_two dm, clr_two dt, clr_entry e) {
     const clr_two um = clr_two_scale(dm, e.spread);
     const clr_two ut = clr_two_scale(dt, e.spread);
-    s.mm = clr_two_gather(s.mm, clr_two_multiply(um, dm));
-    s.tt = clr_two_gather(s.tt, clr_two_multiply(ut, dt));
-    s.mt = clr_two_gather(s.mt, clr_two_multiply(um, dt));
-    s.m = clr_two_gather(s.m, clr_two_times(dm, e.share));
-    s.t = clr_two_gather(s.t, clr_two_times(dt, e.share));
+    s.mm = clr_two_gather_product(s.mm, um, dm);
+    s.tt = clr_two_gather_product(s.tt, ut, dt);
+    s.mt = clr_two_gather_product(s.mt, um, dt);
+    s.m = clr_two_gather_times(s.m, dm, e.share);
+    s.t = clr_two_gather_times(s.t, dt, e.share);
     return s;
 }
 
