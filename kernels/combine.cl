@@ -111,11 +111,12 @@ CLR_FN clr_whole clr_whole_of_all(const clr_groups* groups) {
     return whole;
 }
 
-// Weights and batches together, value by value.
+// Weights and batches together, value by value, and the means of the first group that has any.
 CLR_FN clr_record clr_weigh(clr_planes base, const clr_groups* groups, clr_whole* whole, ulong i) {
     clr_record all = clr_load_group(base, groups, 0, i);
     for (uint g = 1; g < groups->count; ++g) {
         const clr_record more = clr_load_group(base, groups, g, i);
+        all.moments = clr_first_means(all, more);
         all.weight = clr_two_add(all.weight, more.weight);
         all.weight2 = clr_two_add(all.weight2, more.weight2);
         all.batches += more.batches;
@@ -126,50 +127,70 @@ CLR_FN clr_record clr_weigh(clr_planes base, const clr_groups* groups, clr_whole
     return all;
 }
 
-CLR_FN clr_moments clr_pool_all_within(clr_moments all, clr_planes base, const clr_groups* groups, ulong i) {
-    for (uint g = 0; g < groups->count; ++g)
-        if (groups->of[g].batches != 0) all = clr_pool_within(all, clr_load_group(base, groups, g, i).moments);
-    return clr_moments_settle(all);
+CLR_FN bool clr_holds(const clr_groups* groups, uint g) { return groups->of[g].batches != 0; }
+
+// Of all batches, what is the same for every value, or else what each has; means: of the first group that has any.
+CLR_FN clr_record clr_begin_joint(clr_planes base, const clr_groups* groups, clr_whole* whole, ulong i) {
+    if (clr_weighs_values(groups)) return clr_weigh(base, groups, whole, i);
+    uint g = 0;
+    while (g + 1 < groups->count && !clr_holds(groups, g)) ++g;
+    return clr_load_group(base, groups, g, i);
 }
 
+// The first pass.
 CLR_FN clr_record clr_pool_groups(clr_record all, clr_planes base, const clr_groups* groups, clr_whole whole,
                                   clr_question ask, ulong i) {
-    all.moments = clr_moments_none();
+    const bool about_first = clr_uses_groups(ask.estimator);
+    all.moments = about_first ? clr_pool_begin(all.moments) : clr_moments_none();
     all.ratios = clr_ratios_none();
     for (uint g = 0; g < groups->count; ++g) {
-        if (groups->of[g].batches == 0) continue;
+        if (!clr_holds(groups, g)) continue;
         const clr_record group = clr_load_group(base, groups, g, i);
         const clr_part part = clr_part_in(groups, g, group, whole);
         clr_prefetch_planes(base, clr_state_of(groups, g), ask, i + CLR_TILE);
-        all.moments = clr_pool_means(all.moments, group.moments, part.p);
+        all.moments = about_first ? clr_pool_distances(all.moments, group.moments, part.p)
+                                  : clr_pool_means(all.moments, group.moments, part.p);
         if (clr_asks_within(ask)) all.moments = clr_pool_within(all.moments, group.moments);
         all.ratios = clr_pool_ratios(all.ratios, group.ratios, part.p);
     }
     return all;
 }
 
-CLR_FN clr_joint clr_join(clr_planes base, const clr_groups* groups, clr_whole whole, clr_evidence n, clr_real tau,
-                          clr_question ask, ulong i) {
-    clr_record all = clr_load_group(base, groups, 0, i);
-    if (clr_weighs_values(groups)) all = clr_weigh(base, groups, &whole, i);
+// All but the line.
+CLR_FN clr_joint clr_join_groups(clr_planes base, const clr_groups* groups, clr_whole whole, clr_evidence n, clr_real tau,
+                                 clr_question ask, ulong i) {
+    clr_record all = clr_begin_joint(base, groups, &whole, i);
     all = clr_pool_groups(all, base, groups, whole, ask, i);
     clr_joint j = clr_joint_means(all, whole, tau, ask.zero_policy);
     for (uint g = 0; g < groups->count; ++g) {
-        if (groups->of[g].batches == 0) continue;
+        if (!clr_holds(groups, g)) continue;
         const clr_record group = clr_load_group(base, groups, g, i);
         j.folds = clr_fold(j.folds, j.all.moments, j.q, group.moments, clr_part_in(groups, g, group, whole));
     }
-    // A jackknife that falls back has the error of the ratio.
-    if (!clr_asks_within(ask) && clr_any(clr_falls_back(j, ask.estimator) || j.q.empty))
-        j.all.moments = clr_pool_all_within(j.all.moments, base, groups, i);
     j.spread = clr_spread_of_groups(j.all.moments, j.q.quotient, j.folds);
     j.n = n;
+    return j;
+}
+
+CLR_RARE_FN clr_spread clr_spread_within(clr_planes base, const clr_groups* groups, clr_whole whole, clr_real tau,
+                                         clr_question ask, ulong i) {
+    ask.outputs |= CLR_WRITE_BIAS;
+    return clr_join_groups(base, groups, whole, clr_evidence_of_group(groups->of[0], 0), tau, ask, i).spread;
+}
+
+CLR_FN clr_joint clr_join(clr_planes base, const clr_groups* groups, clr_whole whole, clr_evidence n, clr_real tau,
+                          clr_question ask, ulong i) {
+    clr_joint j = clr_join_groups(base, groups, whole, n, tau, ask, i);
+    if (!clr_asks_within(ask)) {
+        j.spread = clr_spread_none();
+        if (clr_any(clr_has_delta_error(j))) j.spread = clr_spread_within(base, groups, whole, tau, ask, i);
+    }
     if (!clr_asks_line(ask)) return j;
     const clr_real slope = clr_slope_of_regression(j.spread.mt, j.spread.tt);
     for (uint g = 0; g < groups->count; ++g) {
-        if (groups->of[g].batches == 0) continue;
+        if (!clr_holds(groups, g)) continue;
         const clr_record group = clr_load_group(base, groups, g, i);
-        j.folds = clr_fold_line(j.folds, j.all.moments, slope, group.moments, clr_part_in(groups, g, group, whole));
+        j.folds = clr_fold_line(j.folds, j.all.moments, slope, group.moments, clr_part_in(groups, g, group, j.whole));
     }
     j.spread.line = clr_line_of_groups(j.all.moments, slope, j.folds);
     return j;

@@ -326,6 +326,52 @@ TEST(Estimator, groups_together_say_what_all_batches_do) {
     }
 }
 
+namespace {
+
+/// The joint mean of m over groups from `near` on, less that in double, and the groups' mean distance from `near`.
+struct JointMean {
+    double error, distance;
+};
+
+JointMean joint_mean(std::span<const TwinValue> groups, device::clr_moments near, double want) {
+    device::clr_two weight{};
+    for (const auto& g : groups) weight = device::clr_two_add(weight, g.record.weight);
+    const auto whole = device::clr_whole_of(weight);
+    auto all = device::clr_pool_begin(near);
+    double distance = 0;
+    for (const auto& g : groups) {
+        const auto part = device::clr_part_of(g.record.weight, whole);
+        all = device::clr_pool_distances(all, g.record.moments, part.p);
+        distance += value(part.p) * std::fabs(value(g.record.moments.m) - static_cast<double>(near.m.hi));
+    }
+    return {std::fabs(value(all.m) - want), distance};
+}
+
+}  // namespace
+
+// Two-float means of groups add 2^-46 of themselves. The first group has lost all its batches.
+TEST(Estimator, joint_means_of_groups_are_as_near_as_the_groups) {
+    const Input in = near_a_line();
+    int caught = 0;
+    for (std::size_t i = 0; i < values; ++i) {
+        std::vector<TwinValue> groups(group_count);
+        Statistics all;
+        for (std::size_t k = 0; k < in.m.size(); ++k) {
+            const bool lost = k % group_count == 0;
+            groups[k % group_count].add(lost ? NAN : in.m[k][i], in.t[k][i], in.weight[k]);
+            if (!lost) all.add(static_cast<double>(in.m[k][i]), static_cast<double>(in.t[k][i]), in.weight[k]);
+        }
+        const auto bound = [&](const JointMean& mean) {
+            return (group_count + 2) * 0x1p-24 * mean.distance + 0x1p-46 * std::fabs(all.mean_m);
+        };
+        const auto first = device::clr_first_means(groups[0].record, groups[1].record);
+        const JointMean mean = joint_mean(groups, first, all.mean_m);
+        EXPECT_LE(mean.error, bound(mean)) << i;
+        caught += joint_mean(groups, groups[0].record.moments, all.mean_m).error > bound(mean);
+    }
+    EXPECT_GT(caught, static_cast<int>(values / 2)) << "planted fault: distances from a group that holds nothing";
+}
+
 TEST(Estimator, device_bias_gain_and_need_match_the_reference) {
     const Engine engine;
     const Input in = input_of(1);

@@ -42,6 +42,7 @@ inline device::clr_joint join_twin(std::span<const TwinValue> groups, float tau,
     using namespace device;
     clr_record all = groups[0].record;
     for (const auto& g : groups.subspan(1)) {
+        all.moments = clr_first_means(all, g.record);
         all.weight = clr_two_add(all.weight, g.record.weight);
         all.weight2 = clr_two_add(all.weight2, g.record.weight2);
         all.batches += g.record.batches;
@@ -52,10 +53,13 @@ inline device::clr_joint join_twin(std::span<const TwinValue> groups, float tau,
     clr_whole whole = clr_whole_of(all.weight);
     const auto part = [&](const TwinValue& g) { return clr_part_of(g.record.weight, whole); };
     for (const auto& g : groups) whole = clr_count_part(whole, part(g));
-    all.moments = clr_moments_none();
+    const bool about_first = clr_uses_groups(ask.estimator);
+    const auto pool = about_first ? clr_pool_distances : clr_pool_means;
+    all.moments = about_first ? clr_pool_begin(all.moments) : clr_moments_none();
     all.ratios = clr_ratios_none();
     for (const auto& g : groups) {
-        all.moments = clr_pool_within(clr_pool_means(all.moments, g.record.moments, part(g).p), g.record.moments);
+        if (g.record.batches == 0) continue;
+        all.moments = clr_pool_within(pool(all.moments, g.record.moments, part(g).p), g.record.moments);
         all.ratios = clr_pool_ratios(all.ratios, g.record.ratios, part(g).p);
     }
     clr_joint j = clr_joint_means(all, whole, tau, ask.zero_policy);

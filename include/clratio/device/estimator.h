@@ -237,12 +237,26 @@ CLR_FN clr_real clr_value_of(clr_joint j, clr_real tau, clr_question ask) {
     return j.q.value;
 }
 
+// What an estimator takes from the groups. It is infinite or NaN where the others of some group do not tell.
+CLR_FN clr_real clr_sum_over_groups(clr_folds f, clr_u32 estimator) {
+    if (estimator == CLR_ESTIMATOR_JACKKNIFE) return f.shift;
+    return estimator == CLR_ESTIMATOR_MICKEY ? f.mickey : f.cross;
+}
+
 // Where the estimator needs more batches or groups than there are.
 CLR_FN clr_mask clr_falls_back(clr_joint j, clr_u32 estimator) {
     if (estimator == CLR_ESTIMATOR_RATIO || estimator == CLR_ESTIMATOR_MEAN || estimator == CLR_ESTIMATOR_MEAN_OF_RATIOS)
         return clr_never();
-    if (clr_uses_groups(estimator)) return j.whole.groups < (clr_uint)(2u) || !clr_is_finite(j.folds.shift);
+    if (clr_uses_groups(estimator))
+        return j.whole.groups < (clr_uint)(2u) || !clr_is_finite(clr_sum_over_groups(j.folds, estimator));
     return j.n.few;
+}
+
+// Where the jackknife has no error of its own.
+CLR_FN clr_mask clr_has_delta_error(clr_joint j) { return j.q.empty || clr_falls_back(j, CLR_ESTIMATOR_JACKKNIFE); }
+
+CLR_FN clr_real clr_delta_error(clr_quotient q, clr_spread s, clr_evidence n) {
+    return clr_slope(q) * clr_root(s.ratio.mm * n.scale);
 }
 
 // The standard error of finite data; the delta method's unless the estimator has one of its own.
@@ -258,9 +272,11 @@ CLR_FN clr_real clr_error_of(clr_joint j, clr_mask fallen, clr_u32 estimator) {
         const clr_real loss = few ? (clr_real)(INFINITY) : (k - one) / (few ? one : k - two);
         return fallen ? mean : clr_root(s.line * n.scale * loss);
     }
-    const clr_real delta = clr_slope(q) * clr_root(s.ratio.mm * n.scale);
-    if (estimator == CLR_ESTIMATOR_JACKKNIFE) return q.empty || fallen ? delta : clr_jackknife_error(q, j.folds, j.whole);
-    return delta;
+    if (estimator != CLR_ESTIMATOR_JACKKNIFE) return clr_delta_error(q, s, n);
+    const clr_mask by_delta = clr_has_delta_error(j);
+    const clr_real error = clr_jackknife_error(q, j.folds, j.whole);
+    if (!clr_any(by_delta)) return error;
+    return by_delta ? clr_delta_error(q, s, n) : error;
 }
 
 CLR_FN clr_real clr_gain_of(clr_spread s) {

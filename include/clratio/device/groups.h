@@ -60,6 +60,32 @@ CLR_FN clr_moments clr_pool_means(clr_moments all, clr_moments group, clr_two p)
     return all;
 }
 
+// x - y in float, for a plain y.
+CLR_FN clr_real clr_two_beyond(clr_two x, clr_real y) { return (x.hi - y) + x.lo; }
+
+// For estimators over groups, which promise no range: the joint means as one group's own and the others' distances from it.
+// They are within (groups + 2) 2^-24 of the mean distance.
+CLR_FN clr_moments clr_pool_begin(clr_moments near) {
+    clr_moments all = clr_moments_none();
+    all.m.hi = near.m.hi;
+    all.t.hi = near.t.hi;
+    return all;
+}
+
+// a's means where it has any weight, else those of the group that comes next.
+CLR_FN clr_moments clr_first_means(clr_record a, clr_record next) {
+    const clr_mask none = !(a.weight.hi > (clr_real)(0.0f));
+    a.moments.m.hi = none ? next.moments.m.hi : a.moments.m.hi;
+    a.moments.t.hi = none ? next.moments.t.hi : a.moments.t.hi;
+    return a.moments;
+}
+
+CLR_FN clr_moments clr_pool_distances(clr_moments all, clr_moments group, clr_two p) {
+    all.m.lo = clr_fma(p.hi, clr_two_beyond(group.m, all.m.hi), all.m.lo);
+    all.t.lo = clr_fma(p.hi, clr_two_beyond(group.t, all.t.hi), all.t.lo);
+    return all;
+}
+
 // The second moments within groups, likewise.
 CLR_FN clr_moments clr_pool_within(clr_moments all, clr_moments group) {
     all.mm = clr_two_gather(all.mm, group.mm);
@@ -93,16 +119,15 @@ CLR_FN clr_folds clr_folds_begin(clr_moments all, clr_quotient q, clr_real tau) 
     clr_folds f;
     f.offset = clr_two_apart(all.m, clr_two_multiply(q.quotient, all.t));
     f.control_error = clr_two_gap(all.t, clr_two_make(tau, zero));
-    f.between.mm = f.between.tt = f.between.mt = f.between.ratio.mm = f.between.ratio.mt = f.between.line = zero;
+    f.between = clr_spread_none();
     f.shift = f.ae = f.aee = f.mickey = f.cross = zero;
     return f;
 }
 
-// m - r t - offset to the float's precision: where m.hi and the product are close, their difference is exact.
+// m - r t - offset to the float's precision: what cancels is rounded once, in the first fma.
 CLR_FN clr_real clr_mean_residual(clr_moments group, clr_two r, clr_two offset) {
-    const clr_two p = clr_two_product(r.hi, group.t.hi);
     const clr_real rest = clr_fma(-r.lo, group.t.hi, clr_fma(-r.hi, group.t.lo, group.m.lo));
-    return ((group.m.hi - p.hi) - offset.hi) + ((rest - p.lo) - offset.lo);
+    return (clr_fma(-r.hi, group.t.hi, group.m.hi) - offset.hi) + (rest - offset.lo);
 }
 
 CLR_FN clr_folds clr_fold(clr_folds f, clr_moments all, clr_quotient q, clr_moments group, clr_part w) {
@@ -126,8 +151,7 @@ CLR_FN clr_folds clr_fold(clr_folds f, clr_moments all, clr_quotient q, clr_mome
 // Of a group's mean from the line through the joint one. Means are seldom twice each other: then the first two are exact.
 CLR_FN clr_real clr_line_distance(clr_moments group, clr_moments all, clr_real slope) {
     const clr_real dm = group.m.hi - all.m.hi, dt = group.t.hi - all.t.hi;
-    const clr_two p = clr_two_product(slope, dt);
-    return (dm - p.hi) + (clr_fma(-slope, group.t.lo - all.t.lo, group.m.lo - all.m.lo) - p.lo);
+    return clr_fma(-slope, dt, dm) + clr_fma(-slope, group.t.lo - all.t.lo, group.m.lo - all.m.lo);
 }
 
 // `within`: the pooled moments; `slope`: of the regression over all batches.

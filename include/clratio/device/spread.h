@@ -19,6 +19,12 @@ typedef struct {
     clr_real line;  // M2 of m about its regression on t
 } clr_spread;
 
+CLR_FN clr_spread clr_spread_none(void) {
+    clr_spread d;
+    d.mm = d.tt = d.mt = d.ratio.mm = d.ratio.mt = d.line = (clr_real)(0.0f);
+    return d;
+}
+
 CLR_FN clr_residual clr_residual_of(clr_moments s, clr_two r) {
     const clr_two twice = clr_two_make(s.mt.hi + s.mt.hi, s.mt.lo + s.mt.lo), part = clr_two_multiply(r, s.tt);
     clr_residual d;
