@@ -36,7 +36,7 @@
 #define CLR_FN static inline __attribute__((always_inline))
 #define CLR_RARE_FN static __attribute__((noinline))  // large, and seldom called
 // OpenCL's own prefetch() does nothing there. Any address will do.
-#define clr_prefetch(p) __builtin_prefetch((const void*)(size_t)(p))
+#define clr_prefetch(p) __builtin_prefetch((const void*)(size_t)(p), 0, 2)
 #else
 #define CLR_FN static inline
 #define CLR_RARE_FN static
