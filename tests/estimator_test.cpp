@@ -372,6 +372,37 @@ TEST(Estimator, joint_means_of_groups_are_as_near_as_the_groups) {
     EXPECT_GT(caught, static_cast<int>(values / 2)) << "planted fault: distances from a group that holds nothing";
 }
 
+// Then the ratio without that group has no denominator, and the slope without it is 0: neither is what rounding leaves.
+TEST(Estimator, only_ratios_fall_back_where_all_t_is_in_one_group) {
+    const Input in = input_of(4);
+    const float tau = 1.25f;
+    for (std::size_t i = 0; i < values; ++i) {
+        std::vector<TwinValue> groups(group_count);
+        std::vector<Statistics> want(group_count);
+        for (std::size_t k = 0; k < in.m.size(); ++k) {
+            const std::size_t g = k % group_count;
+            const float t = g == 0 ? in.t[k][i] : 0.0f;
+            groups[g].add(in.m[k][i], t, in.weight[k]);
+            want[g].add(static_cast<double>(in.m[k][i]), static_cast<double>(t), in.weight[k]);
+        }
+        const auto read = [&](std::uint32_t estimator) {
+            device::clr_question ask{};
+            ask.estimator = estimator;
+            ask.outputs = CLR_WRITE_ESTIMATE | CLR_WRITE_ERROR | CLR_WRITE_FLAGS;
+            return read_twin(groups, tau, ask);
+        };
+        const auto crossfit = read(CLR_ESTIMATOR_CROSSFIT_REGRESSION);
+        EXPECT_FALSE(crossfit.flags & CLR_FLAG_FELL_BACK) << i;
+        const double size = std::fabs(estimate(want, Estimator::ratio, static_cast<double>(tau))) +
+                            8 * standard_error(want, Estimator::ratio, static_cast<double>(tau));
+        EXPECT_NEAR(static_cast<double>(crossfit.value),
+                    estimate(want, Estimator::crossfit_regression, static_cast<double>(tau)), 12 * 0x1p-24 * size)
+            << i;
+        EXPECT_TRUE(read(CLR_ESTIMATOR_JACKKNIFE).flags & CLR_FLAG_FELL_BACK) << i;
+        EXPECT_TRUE(read(CLR_ESTIMATOR_MICKEY).flags & CLR_FLAG_FELL_BACK) << i;
+    }
+}
+
 TEST(Estimator, device_bias_gain_and_need_match_the_reference) {
     const Engine engine;
     const Input in = input_of(1);

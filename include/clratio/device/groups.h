@@ -130,6 +130,9 @@ CLR_FN clr_real clr_mean_residual(clr_moments group, clr_two r, clr_two offset) 
     return (clr_fma(-r.hi, group.t.hi, group.m.hi) - offset.hi) + (rest - offset.lo);
 }
 
+// What the other groups have of a sum counts as nothing below this part of it: rounding leaves as much where they have none.
+#define CLR_LEAST_REST 0x1p-16f
+
 CLR_FN clr_folds clr_fold(clr_folds f, clr_moments all, clr_quotient q, clr_moments group, clr_part w) {
     const clr_real dm = clr_two_gap(group.m, all.m), dt = clr_two_gap(group.t, all.t);
     f.between.mm = clr_fma(w.weight * dm, dm, f.between.mm);
@@ -140,7 +143,9 @@ CLR_FN clr_folds clr_fold(clr_folds f, clr_moments all, clr_quotient q, clr_mome
     f.between.ratio.mm = clr_fma(heavy, u, f.between.ratio.mm);
     f.between.ratio.mt = clr_fma(heavy, dt, f.between.ratio.mt);
 
-    const clr_real e = u / clr_fma(-w.a, dt, q.denominator), ae = w.a * e;
+    const clr_real t_rest = clr_fma(-w.a, dt, q.denominator);
+    const clr_mask some = clr_abs(t_rest) > clr_abs(q.denominator) * (clr_real)(CLR_LEAST_REST);
+    const clr_real e = u / (some ? t_rest : (clr_real)(0.0f)), ae = w.a * e;
     f.shift = clr_fma(w.p.hi, e, f.shift);
     f.ae += ae;
     f.aee = clr_fma(ae, e, f.aee);
@@ -163,7 +168,8 @@ CLR_FN clr_folds clr_fold_line(clr_folds f, clr_moments within, clr_real slope, 
     const clr_real apart = w.apart * dt;
     const clr_real tt = clr_two_gap(within.tt, group.tt) + clr_fma(-apart, dt, f.between.tt);
     const clr_real mt = clr_two_gap(within.mt, group.mt) + clr_fma(-apart, dm, f.between.mt);
-    f.cross = clr_fma(w.p.hi * clr_slope_of_regression(mt, tt), dt + f.control_error, f.cross);
+    const clr_real least = (within.tt.hi + f.between.tt) * (clr_real)(CLR_LEAST_REST);
+    f.cross = clr_fma(w.p.hi * clr_slope_above(mt, tt, least), dt + f.control_error, f.cross);
     return f;
 }
 
