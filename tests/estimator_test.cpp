@@ -376,6 +376,7 @@ TEST(Estimator, joint_means_of_groups_are_as_near_as_the_groups) {
 TEST(Estimator, only_ratios_fall_back_where_all_t_is_in_one_group) {
     const Input in = input_of(4);
     const float tau = 1.25f;
+    int left = 0;
     for (std::size_t i = 0; i < values; ++i) {
         std::vector<TwinValue> groups(group_count);
         std::vector<Statistics> want(group_count);
@@ -400,7 +401,13 @@ TEST(Estimator, only_ratios_fall_back_where_all_t_is_in_one_group) {
             << i;
         EXPECT_TRUE(read(CLR_ESTIMATOR_JACKKNIFE).flags & CLR_FLAG_FELL_BACK) << i;
         EXPECT_TRUE(read(CLR_ESTIMATOR_MICKEY).flags & CLR_FLAG_FELL_BACK) << i;
+
+        const auto j = join_twin(groups, tau, {});
+        const auto part = device::clr_part_of(groups[0].record.weight, j.whole);
+        const float dt = device::clr_two_gap(groups[0].record.moments.t, j.all.moments.t);
+        left += std::fma(-part.a, dt, j.q.denominator) != 0;
     }
+    EXPECT_GT(left, 0) << "planted fault: without a least part of the whole, the mean of the others is not 0";
 }
 
 TEST(Estimator, device_bias_gain_and_need_match_the_reference) {
