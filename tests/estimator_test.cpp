@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "clratio/combine.hpp"
+#include "support/grouped.hpp"
 #include "support/oclgrind.hpp"
 #include "support/refused.hpp"
 #include "support/samples.hpp"
@@ -149,46 +150,6 @@ TEST(Estimator, student_quantiles_are_right_and_checked) {
 
 namespace {
 
-constexpr std::size_t values = 517;
-constexpr std::uint32_t group_count = 5;
-constexpr std::size_t batch_count = 23;
-const std::vector<float> taus(values, 1.25f);
-
-struct Input {
-    std::vector<std::vector<float>> m, t;
-    std::vector<double> weight;
-};
-
-/// Correlated positive pairs with zeros in m; unequal weights; group k mod 5.
-Input input_of(std::uint64_t seed, std::size_t batches = batch_count) {
-    Samples draw(seed);
-    Input in;
-    for (std::size_t k = 0; k < batches; ++k) {
-        in.t.push_back(floats(values, [&] { return draw.lognormal(0.5); }));
-        in.m.push_back(in.t.back());
-        for (auto& x : in.m.back()) x *= draw.uniform() < 0.3 ? 0 : static_cast<float>(0.5 + draw.uniform());
-        in.weight.push_back(static_cast<double>(1 + k % 4));
-    }
-    return in;
-}
-
-Moments moments_of(const Engine& engine, const Input& in, MomentsOptions options) {
-    Moments s(engine, values, options);
-    std::vector<HostBatch> batches;
-    for (std::size_t k = 0; k < in.m.size(); ++k) batches.push_back({in.m[k], in.t[k], in.weight[k]});
-    s.add(batches);
-    return s;
-}
-
-constexpr MomentsOptions everything{.ratios = true, .groups = group_count};
-
-std::vector<Statistics> reference(const Input& in, std::size_t value) {
-    std::vector<Statistics> groups(group_count);
-    for (std::size_t k = 0; k < in.m.size(); ++k)
-        groups[k % group_count].add(static_cast<double>(in.m[k][value]), static_cast<double>(in.t[k][value]), in.weight[k]);
-    return groups;
-}
-
 CombineOptions all_of(Estimator e, IntervalMethod method = IntervalMethod::fieller) {
     CombineOptions o{.estimator = e};
     o.standard_error = e != Estimator::mean_of_ratios;
@@ -203,7 +164,7 @@ struct Worst {
     double value = 0, error = 0;
 };
 
-Worst worst_of(const Input& in, const Combined& out, Estimator e, Estimator oracle) {
+Worst worst_of(const GroupedInput& in, const Combined& out, Estimator e, Estimator oracle) {
     Worst worst;
     for (std::size_t i = 0; i < values; ++i) {
         const auto groups = reference(in, i);
@@ -225,7 +186,7 @@ Worst worst_of(const Input& in, const Combined& out, Estimator e, Estimator orac
 TEST(Estimator, device_matches_the_reference_in_double) {
     const Engine engine;
     for (const std::uint64_t seed : {1, 2, 3}) {
-        const Input in = input_of(seed);
+        const GroupedInput in = input_of(seed);
         const Moments s = moments_of(engine, in, everything);
         for (const Estimator e : all_estimators()) {
             const Combined out = combine(s, Tau(std::span<const float>(taus)), all_of(e));
@@ -239,180 +200,9 @@ TEST(Estimator, device_matches_the_reference_in_double) {
     }
 }
 
-namespace {
-
-/// Where sums over groups would cancel: m is a line in t up to 1e-3. A third of the values has t = 0, another tau = 0, some
-/// both.
-Input near_a_line() {
-    Samples draw(5);
-    Input in;
-    for (std::size_t k = 0; k < batch_count; ++k) {
-        in.t.push_back(floats(values, [&] { return 4 + draw.uniform(); }));
-        in.m.push_back(in.t.back());
-        for (auto& x : in.m.back()) x = 0.3f + 0.5f * x + 1e-3f * static_cast<float>(draw.uniform());
-        for (std::size_t i = 0; i < values; i += 3) in.t.back()[i] = 0;
-        in.weight.push_back(static_cast<double>(1 + k % 4));
-    }
-    return in;
-}
-
-/// Groups of a value as the kernels have them.
-std::vector<TwinValue> twins(const Input& in, std::size_t value) {
-    std::vector<TwinValue> groups(group_count);
-    for (std::size_t k = 0; k < in.m.size(); ++k) groups[k % group_count].add(in.m[k][value], in.t[k][value], in.weight[k]);
-    return groups;
-}
-
-/// Error bars with a fault: without what lies between groups, or with the residual of means not about the joint one.
-enum class Fault { within_alone, no_offset };
-
-float error_with(Fault fault, std::span<const TwinValue> groups, float tau) {
-    device::clr_question ask{};
-    ask.outputs = CLR_WRITE_ERROR;
-    auto j = join_twin(groups, tau, ask);
-    if (fault == Fault::within_alone) j.spread = device::clr_spread_of(j.all.moments, j.q.quotient);
-    if (fault == Fault::no_offset) {
-        auto folds = device::clr_folds_begin(j.all.moments, j.q, tau);
-        folds.offset = {0, 0};
-        for (const auto& g : groups)
-            folds =
-                device::clr_fold(folds, j.all.moments, j.q, g.record.moments, device::clr_part_of(g.record.weight, j.whole));
-        j.spread = device::clr_spread_of_groups(j.all.moments, j.q.quotient, folds);
-    }
-    return device::clr_read_out(j, batch_count, tau, 0, ask).error;
-}
-
-std::vector<float> partly_zero() {
-    std::vector<float> tau = taus;
-    for (std::size_t i = 0; i < values; ++i)
-        if (i % 3 == 1 || i % 9 == 0) tau[i] = 0;
-    return tau;
-}
-
-}  // namespace
-
-// Both read-outs round a dozen times, and the second moments between groups are float sums: 16 ulp of an error bar in all.
-// About the line, second moments of 2^-46 precision cancel down to 5e-6 of themselves: 2^-28, a 64th of that.
-TEST(Estimator, groups_together_say_what_all_batches_do) {
-    const Engine engine;
-    const Input in = near_a_line();
-    const std::vector<float> tau = partly_zero();
-    for (const Estimator e : {Estimator::ratio, Estimator::mean, Estimator::beale, Estimator::regression}) {
-        const CombineOptions options{.estimator = e, .standard_error = true, .bias = true, .gain = true};
-        const Combined one = combine(moments_of(engine, in, {}), Tau(std::span<const float>(tau)), options);
-        const Combined five =
-            combine(moments_of(engine, in, {.groups = group_count}), Tau(std::span<const float>(tau)), options);
-        for (std::size_t i = 0; i < values; ++i) {
-            Statistics all;
-            for (const auto& g : reference(in, i)) all.merge(g);
-            const auto near = [&](float a, float b, double ulps, double also = 0) {
-                const double size = std::fabs(static_cast<double>(b)) + also;
-                EXPECT_NEAR(static_cast<double>(a), static_cast<double>(b), ulps * 0x1p-24 * size) << name_of(e) << ' ' << i;
-            };
-            near(five.estimate[i], one.estimate[i], 4, std::fabs(all.mean_t - static_cast<double>(tau[i])));
-            near(five.standard_error[i], one.standard_error[i], 16);
-            near(five.gain[i], one.gain[i], 32);
-            if (std::isfinite(one.bias[i])) near(five.bias[i], one.bias[i], 32);
-            if (e != Estimator::ratio) continue;
-            const auto groups = twins(in, i);
-            const auto caught = [&](Fault fault) {
-                return std::fabs(error_with(fault, groups, tau[i]) / one.standard_error[i] - 1) > 16 * 0x1p-24f;
-            };
-            EXPECT_TRUE(caught(Fault::within_alone)) << "planted fault: nothing between groups, value " << i;
-            if (i % 3 == 0 || tau[i] == 0) {
-                EXPECT_TRUE(caught(Fault::no_offset)) << "planted fault: residuals about 0, value " << i;
-            }
-        }
-    }
-}
-
-namespace {
-
-/// The joint mean of m over groups from `near` on, less that in double, and the groups' mean distance from `near`.
-struct JointMean {
-    double error, distance;
-};
-
-JointMean joint_mean(std::span<const TwinValue> groups, device::clr_moments near, double want) {
-    device::clr_two weight{};
-    for (const auto& g : groups) weight = device::clr_two_add(weight, g.record.weight);
-    const auto whole = device::clr_whole_of(weight);
-    auto all = device::clr_pool_begin(near);
-    double distance = 0;
-    for (const auto& g : groups) {
-        const auto part = device::clr_part_of(g.record.weight, whole);
-        all = device::clr_pool_distances(all, g.record.moments, part.p);
-        distance += value(part.p) * std::fabs(value(g.record.moments.m) - static_cast<double>(near.m.hi));
-    }
-    return {std::fabs(value(all.m) - want), distance};
-}
-
-}  // namespace
-
-// Two-float means of groups add 2^-46 of themselves. The first group has lost all its batches.
-TEST(Estimator, joint_means_of_groups_are_as_near_as_the_groups) {
-    const Input in = near_a_line();
-    int caught = 0;
-    for (std::size_t i = 0; i < values; ++i) {
-        std::vector<TwinValue> groups(group_count);
-        Statistics all;
-        for (std::size_t k = 0; k < in.m.size(); ++k) {
-            const bool lost = k % group_count == 0;
-            groups[k % group_count].add(lost ? NAN : in.m[k][i], in.t[k][i], in.weight[k]);
-            if (!lost) all.add(static_cast<double>(in.m[k][i]), static_cast<double>(in.t[k][i]), in.weight[k]);
-        }
-        const auto bound = [&](const JointMean& mean) {
-            return (group_count + 2) * 0x1p-24 * mean.distance + 0x1p-46 * std::fabs(all.mean_m);
-        };
-        const auto first = device::clr_first_means(groups[0].record, groups[1].record);
-        const JointMean mean = joint_mean(groups, first, all.mean_m);
-        EXPECT_LE(mean.error, bound(mean)) << i;
-        caught += joint_mean(groups, groups[0].record.moments, all.mean_m).error > bound(mean);
-    }
-    EXPECT_GT(caught, static_cast<int>(values / 2)) << "planted fault: distances from a group that holds nothing";
-}
-
-// Then the ratio without that group has no denominator, and the slope without it is 0: neither is what rounding leaves.
-TEST(Estimator, only_ratios_fall_back_where_all_t_is_in_one_group) {
-    const Input in = input_of(4);
-    const float tau = 1.25f;
-    int left = 0;
-    for (std::size_t i = 0; i < values; ++i) {
-        std::vector<TwinValue> groups(group_count);
-        std::vector<Statistics> want(group_count);
-        for (std::size_t k = 0; k < in.m.size(); ++k) {
-            const std::size_t g = k % group_count;
-            const float t = g == 0 ? in.t[k][i] : 0.0f;
-            groups[g].add(in.m[k][i], t, in.weight[k]);
-            want[g].add(static_cast<double>(in.m[k][i]), static_cast<double>(t), in.weight[k]);
-        }
-        const auto read = [&](std::uint32_t estimator) {
-            device::clr_question ask{};
-            ask.estimator = estimator;
-            ask.outputs = CLR_WRITE_ESTIMATE | CLR_WRITE_ERROR | CLR_WRITE_FLAGS;
-            return read_twin(groups, tau, ask);
-        };
-        const auto crossfit = read(CLR_ESTIMATOR_CROSSFIT_REGRESSION);
-        EXPECT_FALSE(crossfit.flags & CLR_FLAG_FELL_BACK) << i;
-        const double size = std::fabs(estimate(want, Estimator::ratio, static_cast<double>(tau))) +
-                            8 * standard_error(want, Estimator::ratio, static_cast<double>(tau));
-        EXPECT_NEAR(static_cast<double>(crossfit.value),
-                    estimate(want, Estimator::crossfit_regression, static_cast<double>(tau)), 12 * 0x1p-24 * size)
-            << i;
-        EXPECT_TRUE(read(CLR_ESTIMATOR_JACKKNIFE).flags & CLR_FLAG_FELL_BACK) << i;
-        EXPECT_TRUE(read(CLR_ESTIMATOR_MICKEY).flags & CLR_FLAG_FELL_BACK) << i;
-
-        const auto j = join_twin(groups, tau, {});
-        const auto part = device::clr_part_of(groups[0].record.weight, j.whole);
-        const float dt = device::clr_two_gap(groups[0].record.moments.t, j.all.moments.t);
-        left += std::fma(-part.a, dt, j.q.denominator) != 0;
-    }
-    EXPECT_GT(left, 0) << "planted fault: without a least part of the whole, the mean of the others is not 0";
-}
-
 TEST(Estimator, device_bias_gain_and_need_match_the_reference) {
     const Engine engine;
-    const Input in = input_of(1);
+    const GroupedInput in = input_of(1);
     const Combined out =
         combine(moments_of(engine, in, everything), Tau(std::span<const float>(taus)), all_of(Estimator::ratio));
     for (std::size_t i = 0; i < values; ++i) {
@@ -432,7 +222,7 @@ TEST(Estimator, device_bias_gain_and_need_match_the_reference) {
 TEST(Estimator, device_intervals_match_the_reference) {
     const Engine engine;
     for (const std::size_t batches : {3, 4, 8, 23}) {
-        const Input in = input_of(2, batches);
+        const GroupedInput in = input_of(2, batches);
         const Moments s = moments_of(engine, in, everything);
         const double q = student_quantile(0.95, static_cast<double>(batches - 1));
         const Combined delta =
@@ -469,7 +259,7 @@ TEST(Estimator, device_intervals_match_the_reference) {
 }
 
 TEST(Estimator, device_has_the_twins_bits_at_every_shape) {
-    Input in = input_of(3, 11);
+    GroupedInput in = input_of(3, 11);
     in.m[4][9] = in.t[7][300] = std::numeric_limits<float>::quiet_NaN();
     std::vector<std::vector<TwinValue>> twin(values, std::vector<TwinValue>(group_count));
     for (std::size_t k = 0; k < in.m.size(); ++k)
@@ -518,38 +308,9 @@ TEST(Estimator, programs_of_one_estimator_have_the_bits_of_the_general_one) {
     }
 }
 
-// A batch's own index, not the order of arrival, chooses its group.
-TEST(Estimator, groups_follow_the_index) {
-    const Engine engine;
-    const Input in = input_of(1, 12);
-    const auto add = [&](Moments& s, std::size_t first, std::size_t last) {
-        for (std::size_t k = first; k < last; ++k) {
-            const HostBatch b{in.m[k], in.t[k], in.weight[k], k};
-            s.add(std::span(&b, 1));
-        }
-    };
-    Moments whole(engine, values, everything), front(engine, values, everything), back(engine, values, everything);
-    add(whole, 0, 12);
-    add(front, 0, 6);
-    add(back, 6, 12);
-    front.merge(back);
-    const auto read = [](const Moments& s) {
-        return combine(s, Tau(std::span<const float>(taus)), {.estimator = Estimator::mickey}).estimate;
-    };
-    const auto a = read(whole), b = read(front);
-    for (std::size_t i = 0; i < values; ++i) EXPECT_NEAR(a[i], b[i], 4 * 0x1p-23f * std::fabs(a[i]));
-    Moments wrong(engine, values, everything);
-    add(wrong, 6, 12);
-    for (std::size_t k = 0; k < 6; ++k) wrong.add(in.m[k], in.t[k], in.weight[k]);
-    const auto c = read(wrong);
-    std::size_t differ = 0;
-    for (std::size_t i = 0; i < values; ++i) differ += std::fabs(a[i] - c[i]) > 4 * 0x1p-23f * std::fabs(a[i]);
-    EXPECT_GT(differ, values / 2) << "planted fault: groups by order of arrival";
-}
-
 TEST(Estimator, too_few_batches_fall_back_and_say_so) {
     const Engine engine;
-    const Input in = input_of(2, 1);
+    const GroupedInput in = input_of(2, 1);
     const Moments s = moments_of(engine, in, everything);
     const auto read = [&](Estimator e) { return combine(s, Tau(std::span<const float>(taus)), {.estimator = e}); };
     const Combined ratio = read(Estimator::ratio), mean = read(Estimator::mean);
@@ -676,7 +437,7 @@ TEST(Estimator, misuse_is_refused_by_name) {
 
 TEST(EstimatorSmall, every_estimator) {
     using Path = EngineOptions::Path;
-    Input in = input_of(1, 3);
+    GroupedInput in = input_of(1, 3);
     for (auto* of : {&in.m, &in.t})
         for (auto& v : *of) v.resize(13);
     for (const EngineOptions& options :

@@ -1,0 +1,53 @@
+// Batches whose values are asked for group by group, and what the reference and the twin make of them.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "clratio/combine.hpp"
+#include "clratio/estimator.hpp"
+#include "support/samples.hpp"
+
+namespace clratio::test {
+
+constexpr std::size_t values = 517;
+constexpr std::uint32_t group_count = 5;
+constexpr std::size_t batch_count = 23;
+inline const std::vector<float> taus(values, 1.25f);
+
+struct GroupedInput {
+    std::vector<std::vector<float>> m, t;
+    std::vector<double> weight;
+};
+
+/// Correlated positive pairs with zeros in m; unequal weights; group k mod 5.
+inline GroupedInput input_of(std::uint64_t seed, std::size_t batches = batch_count) {
+    Samples draw(seed);
+    GroupedInput in;
+    for (std::size_t k = 0; k < batches; ++k) {
+        in.t.push_back(floats(values, [&] { return draw.lognormal(0.5); }));
+        in.m.push_back(in.t.back());
+        for (auto& x : in.m.back()) x *= draw.uniform() < 0.3 ? 0 : static_cast<float>(0.5 + draw.uniform());
+        in.weight.push_back(static_cast<double>(1 + k % 4));
+    }
+    return in;
+}
+
+inline Moments moments_of(const Engine& engine, const GroupedInput& in, MomentsOptions options) {
+    Moments s(engine, values, options);
+    std::vector<HostBatch> batches;
+    for (std::size_t k = 0; k < in.m.size(); ++k) batches.push_back({in.m[k], in.t[k], in.weight[k]});
+    s.add(batches);
+    return s;
+}
+
+constexpr MomentsOptions everything{.ratios = true, .groups = group_count};
+
+inline std::vector<Statistics> reference(const GroupedInput& in, std::size_t value) {
+    std::vector<Statistics> groups(group_count);
+    for (std::size_t k = 0; k < in.m.size(); ++k)
+        groups[k % group_count].add(static_cast<double>(in.m[k][value]), static_cast<double>(in.t[k][value]), in.weight[k]);
+    return groups;
+}
+
+}  // namespace clratio::test
