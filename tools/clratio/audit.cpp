@@ -1,6 +1,8 @@
 // clratio audit: the supplement's equations and sentences, each with a number computed now.
 #include "audit.hpp"
 
+#include <CLI/CLI.hpp>
+
 #include <algorithm>
 #include <chrono>
 #include <iterator>

@@ -1,4 +1,6 @@
 // clratio combine: batches of image pairs to one image.
+#include <CLI/CLI.hpp>
+
 #include <algorithm>
 
 #include "combine_run.hpp"

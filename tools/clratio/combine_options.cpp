@@ -1,5 +1,7 @@
 #include "combine_options.hpp"
 
+#include <CLI/CLI.hpp>
+
 #include <algorithm>
 #include <cmath>
 

@@ -1,4 +1,6 @@
 // clratio compare: how far an image is from a reference.
+#include <CLI/CLI.hpp>
+
 #include "difference.hpp"
 #include "tool.hpp"
 

@@ -1,4 +1,6 @@
 // clratio devices: what is there, which one would be picked, and why.
+#include <CLI/CLI.hpp>
+
 #include "clratio/engine.hpp"
 #include "tool.hpp"
 

@@ -1,5 +1,7 @@
 #include "error_options.hpp"
 
+#include <CLI/CLI.hpp>
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>

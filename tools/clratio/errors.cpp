@@ -1,4 +1,6 @@
 // clratio errors: error samples of a model, counted on the device, and whether they follow the laws.
+#include <CLI/CLI.hpp>
+
 #include <algorithm>
 #include <cmath>
 

@@ -1,4 +1,6 @@
 // clratio estimators: bias, error and coverage of every estimator on models whose mean is known, by simulation.
+#include <CLI/CLI.hpp>
+
 #include <cmath>
 #include <filesystem>
 

@@ -1,6 +1,8 @@
 // clratio figures: the supplement's Figures 1 and 2 with the laws that are right beside those that were printed.
 #include "figures.hpp"
 
+#include <CLI/CLI.hpp>
+
 #include <filesystem>
 
 #include "error_options.hpp"

@@ -1,6 +1,8 @@
 // clratio law: density and probability of an estimator's error.
 #include "clratio/law.hpp"
 
+#include <CLI/CLI.hpp>
+
 #include <cmath>
 #include <map>
 

@@ -1,4 +1,6 @@
 // The command line. A subcommand is one file with one add_ function; it is registered here.
+#include <CLI/CLI.hpp>
+
 #include <csignal>
 #include <cstdio>
 #include <thread>

@@ -1,4 +1,6 @@
 // clratio merge: the states of many machines to one.
+#include <CLI/CLI.hpp>
+
 #include "clratio/state.hpp"
 #include "file_lock.hpp"
 #include "output_file.hpp"

@@ -1,4 +1,6 @@
 // clratio picture: images side by side as one PNG.
+#include <CLI/CLI.hpp>
+
 #include <cmath>
 
 #include "clratio/image.hpp"

@@ -1,4 +1,6 @@
 // clratio render: a scene whose answer is known, as images that clratio combine takes.
+#include <CLI/CLI.hpp>
+
 #include <chrono>
 #include <filesystem>
 

@@ -1,4 +1,6 @@
 // clratio study: the errors of every estimator in every scene, against the number of samples, and the report on them.
+#include <CLI/CLI.hpp>
+
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
