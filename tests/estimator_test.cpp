@@ -20,7 +20,6 @@ using namespace clratio::test;
 
 namespace {
 
-constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr double z95 = 1.959963984540054;
 
 /// Contiguous groups of equal size, as the vectors form them.
@@ -261,9 +260,8 @@ TEST(Estimator, device_intervals_match_the_reference) {
 TEST(Estimator, device_has_the_twins_bits_at_every_shape) {
     GroupedInput in = input_of(3, 11);
     in.m[4][9] = in.t[7][300] = std::numeric_limits<float>::quiet_NaN();
-    std::vector<std::vector<TwinValue>> twin(values, std::vector<TwinValue>(group_count));
-    for (std::size_t k = 0; k < in.m.size(); ++k)
-        for (std::size_t i = 0; i < values; ++i) twin[i][k % group_count].add(in.m[k][i], in.t[k][i], in.weight[k]);
+    std::vector<std::vector<TwinValue>> twin;
+    for (std::size_t i = 0; i < values; ++i) twin.push_back(twins(in, i));
     for (const auto& shape : all_shapes()) {
         const Moments s = moments_of(Engine(shape.options), in, everything);
         for (const Estimator e : all_estimators()) {

@@ -29,13 +29,6 @@ GroupedInput near_a_line() {
     return in;
 }
 
-/// Groups of a value as the kernels have them.
-std::vector<TwinValue> twins(const GroupedInput& in, std::size_t value) {
-    std::vector<TwinValue> groups(group_count);
-    for (std::size_t k = 0; k < in.m.size(); ++k) groups[k % group_count].add(in.m[k][value], in.t[k][value], in.weight[k]);
-    return groups;
-}
-
 /// Error bars with a fault: without what lies between groups, or with the residual of means not about the joint one.
 enum class Fault { within_alone, no_offset };
 
@@ -66,7 +59,7 @@ std::vector<float> partly_zero() {
 
 // Both read-outs round a dozen times, and the second moments between groups are float sums: 16 ulp of an error bar in all.
 // About the line, second moments of 2^-46 precision cancel down to 5e-6 of themselves: 2^-28, a 64th of that.
-TEST(Groups, groups_together_say_what_all_batches_do) {
+TEST(Groups, together_say_what_all_batches_do) {
     const Engine engine;
     const GroupedInput in = near_a_line();
     const std::vector<float> tau = partly_zero();
@@ -184,7 +177,7 @@ TEST(Groups, only_ratios_fall_back_where_all_t_is_in_one_group) {
 }
 
 // A batch's own index, not the order of arrival, chooses its group.
-TEST(Groups, groups_follow_the_index) {
+TEST(Groups, follow_the_index) {
     const Engine engine;
     const GroupedInput in = input_of(1, 12);
     const auto add = [&](Moments& s, std::size_t first, std::size_t last) {

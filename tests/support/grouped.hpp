@@ -7,6 +7,7 @@
 #include "clratio/combine.hpp"
 #include "clratio/estimator.hpp"
 #include "support/samples.hpp"
+#include "support/twin.hpp"
 
 namespace clratio::test {
 
@@ -47,6 +48,13 @@ inline std::vector<Statistics> reference(const GroupedInput& in, std::size_t val
     std::vector<Statistics> groups(group_count);
     for (std::size_t k = 0; k < in.m.size(); ++k)
         groups[k % group_count].add(static_cast<double>(in.m[k][value]), static_cast<double>(in.t[k][value]), in.weight[k]);
+    return groups;
+}
+
+/// Groups of a value as the kernels have them.
+inline std::vector<TwinValue> twins(const GroupedInput& in, std::size_t value) {
+    std::vector<TwinValue> groups(group_count);
+    for (std::size_t k = 0; k < in.m.size(); ++k) groups[k % group_count].add(in.m[k][value], in.t[k][value], in.weight[k]);
     return groups;
 }
 
