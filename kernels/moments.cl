@@ -72,18 +72,25 @@ CLR_FN void clr_put_back(clr_moments moments, const clr_adder* a, ulong at) {
                        a->planes, a->state, at);
 }
 
-// What vector v of the next block begins with, while batch k goes over this one: the batch's values, and the plane of the
-// state whose turn it is. Any address will do.
-CLR_FN void clr_prefetch_next(const bool with_plane, uint k, uint v, const clr_adder* a, ulong first) {
-    const ulong next = first + (CLR_BLOCK + v) * CLR_WIDTH;
-    const clr_planes p = a->planes;
-    global const float* plane = k == 1 ? p.m : k == 2 ? p.t : k == 3 ? p.mm : k == 4 ? p.tt : k == 5 ? p.mt : 0;
-    if (with_plane && plane) clr_prefetch_two(plane, a->state, next);
-    if (v * CLR_WIDTH % CLR_LINE) return;
-    for (uint c = 0; c < CLR_WIDTH; c += CLR_LINE) {
-        clr_prefetch(a->m[k] + a->batches->of[k].m.offset + next + c);
-        clr_prefetch(a->t[k] + a->batches->of[k].t.offset + next + c);
+// What is fetched ahead together: a cache line of values, or a vector where that is more or is the block.
+#define CLR_CHUNK (CLR_WIDTH < CLR_LINE && CLR_BLOCK > 1 ? CLR_LINE : CLR_WIDTH)
+
+// The plane of the state whose turn it is to be fetched ahead, while batch k goes over a block.
+CLR_FN global const float* clr_plane_at_turn(clr_planes p, uint k) {
+    return k == 1 ? p.m : k == 2 ? p.t : k == 3 ? p.mm : k == 4 ? p.tt : k == 5 ? p.mt : 0;
+}
+
+// A chunk of m, t and, unless it is 0, a plane. Any address will do.
+CLR_FN void clr_prefetch_chunk(global const float* m, global const float* t, global const float* plane, clr_state s,
+                               ulong at) {
+    CLR_UNROLL
+    for (uint c = 0; c < CLR_CHUNK; c += CLR_LINE) {
+        clr_prefetch(m + c);
+        clr_prefetch(t + c);
     }
+    if (!plane) return;
+    CLR_UNROLL
+    for (uint c = 0; c < CLR_CHUNK; c += CLR_WIDTH) clr_prefetch_two(plane, s, at + c);
 }
 
 // Batch k over a block of whole vectors of contiguous values. The first pass takes the state from the planes. The last one
@@ -95,21 +102,25 @@ CLR_FN uint clr_pass(const bool is_first, const bool is_last, uint k, clr_block*
     global const float* t_from = a->t[k] + batch.t.offset + first;
     const clr_entry e = clr_entry_of(&batch);
     const uint index = a->state.group.batches + k;
+    const ulong ahead = CLR_BLOCK * CLR_WIDTH;
+    global const float* plane = is_first || is_last ? 0 : clr_plane_at_turn(a->planes, k);
     clr_uint signs = *all_signs;
     uint doubtful = 0;
-    for (uint v = 0; v < CLR_BLOCK; ++v) {
-        const ulong at = first + v * CLR_WIDTH;
-        const clr_real m = clr_load(m_from + v * CLR_WIDTH), t = clr_load(t_from + v * CLR_WIDTH);
-        clr_prefetch_next(!is_first && !is_last, k, v, a, first);
-        const clr_moments before = is_first ? clr_load_moments(a->planes, a->state, at) : block->moments[v];
-        const clr_moments moments = clr_moments_add(before, m, t, e, index);
-        signs |= clr_bits(m) | clr_bits(t);
-        if (!is_last)
-            block->moments[v] = moments;
-        else if (clr_skips(a) && clr_in_doubt(moments, clr_lost_before(a->planes, a->state, at)))
-            doubtful |= 1u << v;
-        else
-            clr_put_back(moments, a, at);
+    for (uint chunk = 0; chunk < CLR_BLOCK * CLR_WIDTH; chunk += CLR_CHUNK) {
+        clr_prefetch_chunk(m_from + ahead + chunk, t_from + ahead + chunk, plane, a->state, first + ahead + chunk);
+        for (uint c = chunk; c < chunk + CLR_CHUNK; c += CLR_WIDTH) {
+            const uint v = c / CLR_WIDTH;
+            const clr_real m = clr_load(m_from + c), t = clr_load(t_from + c);
+            signs |= clr_bits(m) | clr_bits(t);
+            const clr_moments before = is_first ? clr_load_moments(a->planes, a->state, first + c) : block->moments[v];
+            const clr_moments moments = clr_moments_add(before, m, t, e, index);
+            if (!is_last)
+                block->moments[v] = moments;
+            else if (clr_skips(a) && clr_in_doubt(moments, clr_lost_before(a->planes, a->state, first + c)))
+                doubtful |= 1u << v;
+            else
+                clr_put_back(moments, a, first + c);
+        }
     }
     *all_signs = signs;
     return doubtful;
