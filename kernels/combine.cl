@@ -5,6 +5,12 @@
 
 #define CLR_ALL_FLAGS 0xffffffffu
 
+#if defined(CLR_ESTIMATOR)
+#define CLR_OPTIONS_OF(groups) CLR_STATE_OPTIONS
+#else
+#define CLR_OPTIONS_OF(groups) (groups)->options
+#endif
+
 #if CLR_GROUPED
 #define CLR_RUN 1
 #else
@@ -64,7 +70,7 @@ kernel void clr_combine(global const float* m, clr_layout m_layout, global const
 }
 
 CLR_FN clr_state clr_state_of(const clr_groups* groups, uint g) {
-    const clr_state s = {g, groups->count, groups->of[g], groups->options};
+    const clr_state s = {g, groups->count, groups->of[g], CLR_OPTIONS_OF(groups)};
     return s;
 }
 
@@ -87,7 +93,7 @@ CLR_FN clr_evidence clr_whole_evidence(const clr_groups* groups, uint reliabilit
 
 #if defined(CLR_MANY_GROUPS)
 
-CLR_FN bool clr_weighs_values(const clr_groups* groups) { return (groups->options & CLR_STATE_PER_VALUE) != 0; }
+CLR_FN bool clr_weighs_values(const clr_groups* groups) { return (CLR_OPTIONS_OF(groups) & CLR_STATE_PER_VALUE) != 0; }
 
 CLR_FN clr_part clr_part_in(const clr_groups* groups, uint g, clr_record group, clr_whole whole) {
     if (clr_weighs_values(groups)) return clr_part_of(group.weight, whole);
@@ -137,6 +143,10 @@ CLR_FN clr_record clr_begin_joint(clr_planes base, const clr_groups* groups, clr
     return clr_load_group(base, groups, g, i);
 }
 
+CLR_FN void clr_prefetch_group(clr_planes base, const clr_groups* groups, uint g, clr_question ask, uint pass, ulong i) {
+    clr_prefetch_planes(base, clr_state_of(groups, g), ask, pass, clr_asks_line(ask) ? 3 : 2, i + CLR_TILE);
+}
+
 // The first pass.
 CLR_FN clr_record clr_pool_groups(clr_record all, clr_planes base, const clr_groups* groups, clr_whole whole,
                                   clr_question ask, ulong i) {
@@ -147,7 +157,7 @@ CLR_FN clr_record clr_pool_groups(clr_record all, clr_planes base, const clr_gro
         if (!clr_holds(groups, g)) continue;
         const clr_record group = clr_load_group(base, groups, g, i);
         const clr_part part = clr_part_in(groups, g, group, whole);
-        clr_prefetch_planes(base, clr_state_of(groups, g), ask, i + CLR_TILE);
+        clr_prefetch_group(base, groups, g, ask, 0, i);
         all.moments = about_first ? clr_pool_distances(all.moments, group.moments, part.p)
                                   : clr_pool_means(all.moments, group.moments, part.p);
         if (clr_asks_within(ask)) all.moments = clr_pool_within(all.moments, group.moments);
@@ -165,6 +175,7 @@ CLR_FN clr_joint clr_join_groups(clr_planes base, const clr_groups* groups, clr_
     for (uint g = 0; g < groups->count; ++g) {
         if (!clr_holds(groups, g)) continue;
         const clr_record group = clr_load_group(base, groups, g, i);
+        clr_prefetch_group(base, groups, g, ask, 1, i);
         j.folds = clr_fold(j.folds, j.all.moments, j.q, group.moments, clr_part_in(groups, g, group, whole));
     }
     j.spread = clr_spread_of_groups(j.all.moments, j.q.quotient, j.folds);
@@ -190,6 +201,7 @@ CLR_FN clr_joint clr_join(clr_planes base, const clr_groups* groups, clr_whole w
     for (uint g = 0; g < groups->count; ++g) {
         if (!clr_holds(groups, g)) continue;
         const clr_record group = clr_load_group(base, groups, g, i);
+        clr_prefetch_group(base, groups, g, ask, 2, i);
         j.folds = clr_fold_line(j.folds, j.all.moments, slope, group.moments, clr_part_in(groups, g, group, j.whole));
     }
     j.spread.line = clr_line_of_groups(j.all.moments, slope, j.folds);
@@ -202,7 +214,7 @@ CLR_FN clr_whole clr_whole_of_all(const clr_groups* groups) { return clr_whole_o
 
 CLR_FN clr_joint clr_join(clr_planes base, const clr_groups* groups, clr_whole whole, clr_evidence n, clr_real tau,
                           clr_question ask, ulong i) {
-    clr_prefetch_planes(base, clr_state_of(groups, 0), ask, i + 8 * CLR_TILE);
+    clr_prefetch_planes(base, clr_state_of(groups, 0), ask, 0, 1, i + 8 * CLR_TILE);
     return clr_joint_of(clr_load_group(base, groups, 0, i), n, tau, ask.zero_policy);
 }
 
@@ -215,9 +227,8 @@ kernel void clr_combine_moments(CLR_PLANE_ARGUMENTS(s), clr_groups groups, CLR_R
 #if defined(CLR_ESTIMATOR)
     ask.estimator = CLR_ESTIMATOR;
     ask.outputs = CLR_ASKED;
-    groups.options = CLR_STATE_OPTIONS;
 #endif
-    const bool skips = groups.options & CLR_STATE_PER_VALUE;
+    const bool skips = CLR_OPTIONS_OF(&groups) & CLR_STATE_PER_VALUE;
     const clr_evidence n = clr_whole_evidence(&groups, ask.reliability);
     const clr_whole whole = clr_whole_of_all(&groups);
     clr_flag_tally tally = {{(clr_uint)(0u)}};

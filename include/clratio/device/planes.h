@@ -128,20 +128,25 @@ CLR_FN void clr_prefetch_two(global const float* p, clr_state s, ulong i) {
     for (int k = 0; k < 2 * CLR_WIDTH; k += CLR_LINE) clr_prefetch(p + k);
 }
 
+// Whether a plane's turn is in this pass: memory answers only so many requests at a time, so each pass over the groups makes
+// its share of them, the later ones more.
+CLR_FN bool clr_has_turn(uint plane, uint planes, uint pass, uint passes) {
+    const uint turn = (plane + 1) * passes - 1;
+    return turn >= pass * planes && turn < (pass + 1) * planes;
+}
+
 // The planes of an estimator: several are more streams than a processor fetches ahead by itself. i may lie past the end.
-CLR_FN void clr_prefetch_planes(clr_planes p, clr_state s, clr_question ask, ulong i) {
-    clr_prefetch_two(p.m, s, i);
-    if (clr_uses_ratios(ask.estimator)) {
-        clr_prefetch_two(p.quotient, s, i);
-        clr_prefetch_two(p.zero_m, s, i);
-        clr_prefetch_two(p.zero_share, s, i);
-    }
-    if (ask.estimator == CLR_ESTIMATOR_MEAN || ask.estimator == CLR_ESTIMATOR_MEAN_OF_RATIOS) return;
-    clr_prefetch_two(p.t, s, i);
-    if (!clr_asks_within(ask)) return;
-    clr_prefetch_two(p.mm, s, i);
-    clr_prefetch_two(p.tt, s, i);
-    clr_prefetch_two(p.mt, s, i);
+CLR_FN void clr_prefetch_planes(clr_planes p, clr_state s, clr_question ask, uint pass, uint passes, ulong i) {
+    const bool mean = ask.estimator == CLR_ESTIMATOR_MEAN, ratios = clr_uses_ratios(ask.estimator);
+    const bool pair = !mean && ask.estimator != CLR_ESTIMATOR_MEAN_OF_RATIOS, within = pair && clr_asks_within(ask);
+    global const float* planes[] = {p.m, p.t, p.mm, p.tt, p.mt, p.quotient, p.zero_m, p.zero_share};
+    const bool reads[] = {true, pair, mean || within, within, within, ratios, ratios, ratios};
+    uint count = 0, plane = 0;
+    CLR_UNROLL
+    for (uint k = 0; k < 8; ++k) count += reads[k] ? 1 : 0;
+    CLR_UNROLL
+    for (uint k = 0; k < 8; ++k)
+        if (reads[k] && clr_has_turn(plane++, count, pass, passes)) clr_prefetch_two(planes[k], s, i);
 }
 
 CLR_FN void clr_store_moments(clr_moments r, clr_planes p, clr_state s, ulong i) {

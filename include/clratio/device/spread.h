@@ -34,10 +34,7 @@ CLR_FN clr_residual clr_residual_of(clr_moments s, clr_two r) {
 }
 
 // mt / tt; 0 where tt is not above `least`.
-CLR_FN clr_real clr_slope_above(clr_real mt, clr_real tt, clr_real least) {
-    const clr_mask flat = !(tt > least);
-    return flat ? (clr_real)(0.0f) : mt / (flat ? (clr_real)(1.0f) : tt);
-}
+CLR_FN clr_real clr_slope_above(clr_real mt, clr_real tt, clr_real least) { return tt > least ? mt / tt : (clr_real)(0.0f); }
 
 // Of m on t; 0 where t does not vary.
 CLR_FN clr_real clr_slope_of_regression(clr_real mt, clr_real tt) { return clr_slope_above(mt, tt, (clr_real)(0.0f)); }
