@@ -1,14 +1,12 @@
 // clratio audit: the supplement's equations and sentences, each with a number computed now.
 #include "audit.hpp"
 
-#include <CLI/CLI.hpp>
-
 #include <algorithm>
 #include <chrono>
 #include <iterator>
 
+#include "command.hpp"
 #include "progress_line.hpp"
-#include "tool.hpp"
 
 namespace tool {
 
@@ -50,21 +48,21 @@ int audit_command(const Options& options) {
 
 void add_audit(CLI::App& app, Run& run) {
     auto options = std::make_shared<Options>();
-    auto* command = app.add_subcommand("audit", "Check equations (1) to (23) of the supplement, with numbers computed now");
-    auto* samples =
-        command->add_option("--samples", options->samples, "Error samples for each number; pairs (m, t) are 10^7 at most")
-            ->capture_default_str()
-            ->check(CLI::Range(quick_samples, std::uint64_t{100'000'000}));
-    command->add_flag("-q,--quick", options->quick, "10^6 samples: a tenth of the work")->excludes(samples);
-    auto* json = command->add_flag("--json", options->json, "Print one JSON array, an object for each number");
-    command->add_flag("--markdown", options->markdown, "Print the page docs/audit.md")->excludes(json);
-    command->footer(
+    Command command(app, "audit", "Check equations (1) to (23) of the supplement, with numbers computed now");
+    const Option samples =
+        command.option("--samples", options->samples, "Error samples for each number; pairs (m, t) are 10^7 at most")
+            .shows_default()
+            .within(quick_samples, 100'000'000);
+    command.flag("-q,--quick", options->quick, "10^6 samples: a tenth of the work").excludes(samples);
+    const Option json = command.flag("--json", options->json, "Print one JSON array, an object for each number");
+    command.flag("--markdown", options->markdown, "Print the page docs/audit.md").excludes(json);
+    command.footer(
         "The supplement is 'Ratio Estimator Properties' by Velinov and Mitchell. A sampled number has its standard\n"
         "error behind +- and must be within 5 of them of what is expected; a computed one has a bound, in brackets where "
         "it\n"
         "shows. Exit code 1: a number is not what it should be. The seeds are fixed.\n\n"
         "Example: clratio audit --quick");
-    command->callback([=, &run] { run = [options] { return audit_command(*options); }; });
+    command.on_call(run, [options] { return audit_command(*options); });
 }
 
 }  // namespace tool

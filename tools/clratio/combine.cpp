@@ -1,10 +1,9 @@
 // clratio combine: batches of image pairs to one image.
-#include <CLI/CLI.hpp>
-
 #include <algorithm>
 
 #include "combine_run.hpp"
 #include "combine_watch.hpp"
+#include "command.hpp"
 #include "interrupt.hpp"
 #include "progress_line.hpp"
 
@@ -70,10 +69,9 @@ int combine(const Options& options) {
 
 void add_combine(CLI::App& app, Run& run) {
     auto options = std::make_shared<Options>();
-    auto* command =
-        app.add_subcommand("combine", "Combine batches of image pairs (m, t) and the known mean tau of t to one image");
-    add_options(*command, options);
-    command->callback([=, &run] { run = [options] { return combine(*options); }; });
+    Command command(app, "combine", "Combine batches of image pairs (m, t) and the known mean tau of t to one image");
+    add_options(command, options);
+    command.on_call(run, [options] { return combine(*options); });
 }
 
 }  // namespace tool

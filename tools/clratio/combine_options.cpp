@@ -1,10 +1,9 @@
 #include "combine_options.hpp"
 
-#include <CLI/CLI.hpp>
-
 #include <algorithm>
 #include <cmath>
 
+#include "command.hpp"
 #include "output_file.hpp"
 
 namespace tool::combining {
@@ -214,33 +213,28 @@ double Options::weight_of(std::uint64_t index) const {
     return weight.at(index - first_batch);
 }
 
-void add_options(CLI::App& app, const std::shared_ptr<Options>& o) {
-    CLI::App* const command = &app;
+void add_options(Command& command, const std::shared_ptr<Options>& o) {
     const auto choice = [&](const char* name, std::string& value, const auto& map, const char* help) {
         std::vector<std::string> words;
         for (const auto& entry : map) words.push_back(entry.first);
-        return command->add_option(name, value, help)->type_name("WORD")->check(CLI::IsMember(words))->capture_default_str();
+        return command.option(name, value, help).type("WORD").one_of(words).shows_default();
     };
-    command->add_option("--m", o->m, "Batches of m, one file each; with --watch a pattern")->type_name("FILE");
-    command->add_option("--t", o->t, "Batches of t, in the same order; with --watch a pattern")->type_name("FILE");
-    command->add_option("--tau", o->tau, "The mean of t: a number, one for each channel, or files, which are averaged")
-        ->type_name("FILE|NUMBER");
-    command->add_option("-o,--output", o->output, "The combined image")->type_name("OUT.exr");
+    command.option("--m", o->m, "Batches of m, one file each; with --watch a pattern").type("FILE");
+    command.option("--t", o->t, "Batches of t, in the same order; with --watch a pattern").type("FILE");
+    command.option("--tau", o->tau, "The mean of t: a number, one for each channel, or files, which are averaged")
+        .type("FILE|NUMBER");
+    command.option("-o,--output", o->output, "The combined image").type("OUT.exr");
     choice("--estimator", o->estimator, estimators, "How batches become an estimate");
     choice("--zero", o->zero, zeros, "What a zero denominator gives");
-    choice("--nonfinite", o->nonfinite, nonfinites, "What a NaN or an infinity in a batch does")
-        ->each([o](const std::string&) { o->nonfinite_given = true; });
-    command
-        ->add_option("--groups", o->groups, "Groups of batches for the estimators that need some (8, or those of --state)")
-        ->type_name("K");
-    command->add_option("--weight", o->weight, "Samples of each batch: one number, or one for each batch")->type_name("W");
-    choice("--weights", o->weights, weightings, "What a weight says")->each([o](const std::string&) {
-        o->weights_given = true;
-    });
-    command->add_option("--interval", o->interval, "A confidence interval of this level")->type_name("LEVEL");
+    choice("--nonfinite", o->nonfinite, nonfinites, "What a NaN or an infinity in a batch does").tells(o->nonfinite_given);
+    command.option("--groups", o->groups, "Groups of batches for the estimators that need some (8, or those of --state)")
+        .type("K");
+    command.option("--weight", o->weight, "Samples of each batch: one number, or one for each batch").type("W");
+    choice("--weights", o->weights, weightings, "What a weight says").tells(o->weights_given);
+    command.option("--interval", o->interval, "A confidence interval of this level").type("LEVEL");
     choice("--method", o->method, methods, "How the interval is made");
     const auto image = [&](const char* name, std::string& file, const char* help) {
-        command->add_option(name, file, help)->type_name("FILE");
+        command.option(name, file, help).type("FILE");
     };
     image("--lower", o->lower, "Write the lower ends of the intervals");
     image("--upper", o->upper, "Write the upper ends");
@@ -248,38 +242,36 @@ void add_options(CLI::App& app, const std::shared_ptr<Options>& o) {
     image("--gain", o->gain, "Write the predicted variance of the ratio over that of the plain mean");
     image("--bias", o->bias, "Write the predicted bias of the ratio");
     image("--needed", o->needed, "Write how many batches are still needed for the target");
-    command->add_option("--target", o->target, "Standard error to reach, in units of m")->type_name("E");
-    command->add_option("--relative-target", o->relative_target, "The same, as a share of the estimate")->type_name("R");
-    command->add_option("--stderr", o->standard_error, "Also write the standard error of each value")->type_name("FILE");
-    command->add_option("--flags", o->flags, "Also write the flags of each value")->type_name("FILE");
-    command->add_option("--layer", o->layer, "The layer to read where a file names none")->type_name("NAME");
-    command->add_option("--reference", o->reference, "Print RMSE and bias of the plain mean and of the estimate against it")
-        ->type_name("FILE");
-    command->add_option("--state", o->state, "Keep the sums in this file, which later runs and machines can go on with")
-        ->type_name("STATE.exr");
-    command->add_flag("--resume", o->resume, "Go on with --state; listed batches that it holds are skipped");
-    command->add_option("--first-batch", o->first_batch, "The index of the first listed batch")
-        ->type_name("N")
-        ->capture_default_str();
-    command->add_option("--checkpoint", o->checkpoint, "Save the state every so many seconds; 0: after each launch")
-        ->type_name("SECONDS")
-        ->check(CLI::NonNegativeNumber)
-        ->capture_default_str();
-    command->add_option("--watch", o->watch, "Add the files of this folder that fit the patterns --m and --t as they appear")
-        ->type_name("DIR");
-    command->add_option("--settle", o->settle, "A file counts when its size and time have stood still for so long")
-        ->type_name("SECONDS")
-        ->check(CLI::NonNegativeNumber)
-        ->capture_default_str();
-    command->add_option("--until-batches", o->until_batches, "End --watch when the sums hold so many batches")
-        ->type_name("N")
-        ->check(CLI::PositiveNumber);
-    command->add_option("--until-error", o->until_error, "End --watch when the RMS of the standard error is at most this")
-        ->type_name("E")
-        ->check(CLI::PositiveNumber);
-    command->add_flag("--fail-on-flag", o->fail_on_flag, "Exit with code 3 if any value was flagged");
-    command->add_flag("--json", o->json, "Print one JSON object instead of text");
-    command->footer(footer);
+    command.option("--target", o->target, "Standard error to reach, in units of m").type("E");
+    command.option("--relative-target", o->relative_target, "The same, as a share of the estimate").type("R");
+    command.option("--stderr", o->standard_error, "Also write the standard error of each value").type("FILE");
+    command.option("--flags", o->flags, "Also write the flags of each value").type("FILE");
+    command.option("--layer", o->layer, "The layer to read where a file names none").type("NAME");
+    command.option("--reference", o->reference, "Print RMSE and bias of the plain mean and of the estimate against it")
+        .type("FILE");
+    command.option("--state", o->state, "Keep the sums in this file, which later runs and machines can go on with")
+        .type("STATE.exr");
+    command.flag("--resume", o->resume, "Go on with --state; listed batches that it holds are skipped");
+    command.option("--first-batch", o->first_batch, "The index of the first listed batch").type("N").shows_default();
+    command.option("--checkpoint", o->checkpoint, "Save the state every so many seconds; 0: after each launch")
+        .type("SECONDS")
+        .not_negative()
+        .shows_default();
+    command.option("--watch", o->watch, "Add the files of this folder that fit the patterns --m and --t as they appear")
+        .type("DIR");
+    command.option("--settle", o->settle, "A file counts when its size and time have stood still for so long")
+        .type("SECONDS")
+        .not_negative()
+        .shows_default();
+    command.option("--until-batches", o->until_batches, "End --watch when the sums hold so many batches")
+        .type("N")
+        .positive();
+    command.option("--until-error", o->until_error, "End --watch when the RMS of the standard error is at most this")
+        .type("E")
+        .positive();
+    command.flag("--fail-on-flag", o->fail_on_flag, "Exit with code 3 if any value was flagged");
+    command.flag("--json", o->json, "Print one JSON object instead of text");
+    command.footer(footer);
 }
 
 void check(const Options& options) {

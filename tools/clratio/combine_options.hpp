@@ -9,7 +9,7 @@
 
 #include "bands.hpp"
 #include "clratio/image.hpp"
-#include "tool.hpp"
+#include "command.hpp"
 
 namespace tool::combining {
 
@@ -60,7 +60,7 @@ struct Options {
 };
 
 /// Adds the options and the footer to the subcommand, which fills `options` when it is parsed.
-void add_options(CLI::App& command, const std::shared_ptr<Options>& options);
+void add_options(Command& command, const std::shared_ptr<Options>& options);
 
 /// UsageError for options that do not fit together, IoError for a folder that is not there: before the work, not after it.
 void check(const Options& options);

@@ -1,8 +1,6 @@
 // clratio compare: how far an image is from a reference.
-#include <CLI/CLI.hpp>
-
+#include "command.hpp"
 #include "difference.hpp"
-#include "tool.hpp"
 
 namespace tool {
 namespace {
@@ -44,18 +42,16 @@ int compare(const Options& options) {
 
 void add_compare(CLI::App& app, Run& run) {
     auto options = std::make_shared<Options>();
-    auto* command = app.add_subcommand("compare", "Compare an image with a reference, over all pixels and channels");
-    command->add_option("image", options->image, "The image, FILE or FILE:LAYER")->required()->type_name("A.exr");
-    command->add_option("reference", options->reference, "What it should be, FILE or FILE:LAYER")
-        ->required()
-        ->type_name("REF.exr");
-    command->add_option("--layer", options->layer, "The layer to read where a file names none")->type_name("NAME");
-    command->add_flag("--json", options->json, "Print one JSON object");
-    command->footer("RMSE, bias (mean of A - REF), MAE and relative MSE (its formula and epsilon are printed) are over the\n"
-                    "values that are finite in both files; the others are counted. Files of different sizes, windows or\n"
-                    "channels are refused.\n\n"
-                    "Example: clratio compare out.exr reference.exr --json");
-    command->callback([=, &run] { run = [options] { return compare(*options); }; });
+    Command command(app, "compare", "Compare an image with a reference, over all pixels and channels");
+    command.option("image", options->image, "The image, FILE or FILE:LAYER").required().type("A.exr");
+    command.option("reference", options->reference, "What it should be, FILE or FILE:LAYER").required().type("REF.exr");
+    command.option("--layer", options->layer, "The layer to read where a file names none").type("NAME");
+    command.flag("--json", options->json, "Print one JSON object");
+    command.footer("RMSE, bias (mean of A - REF), MAE and relative MSE (its formula and epsilon are printed) are over the\n"
+                   "values that are finite in both files; the others are counted. Files of different sizes, windows or\n"
+                   "channels are refused.\n\n"
+                   "Example: clratio compare out.exr reference.exr --json");
+    command.on_call(run, [options] { return compare(*options); });
 }
 
 }  // namespace tool

@@ -1,8 +1,6 @@
 // clratio devices: what is there, which one would be picked, and why.
-#include <CLI/CLI.hpp>
-
 #include "clratio/engine.hpp"
-#include "tool.hpp"
+#include "command.hpp"
 
 namespace tool {
 namespace {
@@ -70,15 +68,14 @@ int devices(const Options& options) {
 
 void add_devices(CLI::App& app, Run& run) {
     auto options = std::make_shared<Options>();
-    auto* command = app.add_subcommand("devices", "List the OpenCL devices, and say which would be picked and why");
-    command->add_flag("--json", options->json, "Print one JSON object");
-    command->add_flag(
-        "--self-test", options->self_test,
-        "Also compute 64 values on the picked device and compare the bits with the host's (exit 1 if they differ)");
-    command->footer(
+    Command command(app, "devices", "List the OpenCL devices, and say which would be picked and why");
+    command.flag("--json", options->json, "Print one JSON object");
+    command.flag("--self-test", options->self_test,
+                 "Also compute 64 values on the picked device and compare the bits with the host's (exit 1 if they differ)");
+    command.footer(
         "CLRATIO_DEVICE chooses: \"0:0\" (platform:device), \"cpu\", \"gpu\", or a part of a name. Without it: the first\n"
         "GPU, else the first CPU.");
-    command->callback([=, &run] { run = [options] { return devices(*options); }; });
+    command.on_call(run, [options] { return devices(*options); });
 }
 
 }  // namespace tool

@@ -1,6 +1,5 @@
 #include "error_options.hpp"
-
-#include <CLI/CLI.hpp>
+#include "command.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -19,13 +18,13 @@ std::uint64_t whole_number(const std::string& option, const std::string& text) {
     return static_cast<std::uint64_t>(real);
 }
 
-void StreamOptions::add_to(CLI::App& command) {
-    command.add_option("--seed", seed, "Seed of the stream")->type_name("WHOLE")->capture_default_str();
-    command.add_option("--stream", id, "Stream id of the first model; the next one has the next id")->capture_default_str();
-    command.add_option("--rng", rng, "philox, or pcg4d3x: faster, see docs/streams.md")
-        ->check(CLI::IsMember({"philox", "pcg4d3x"}))
-        ->type_name("WORD")
-        ->capture_default_str();
+void StreamOptions::add_to(Command& command) {
+    command.option("--seed", seed, "Seed of the stream").type("WHOLE").shows_default();
+    command.option("--stream", id, "Stream id of the first model; the next one has the next id").shows_default();
+    command.option("--rng", rng, "philox, or pcg4d3x: faster, see docs/streams.md")
+        .one_of({"philox", "pcg4d3x"})
+        .type("WORD")
+        .shows_default();
 }
 
 clratio::Stream StreamOptions::stream() const {

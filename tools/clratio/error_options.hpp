@@ -5,10 +5,10 @@
 #include <string>
 
 #include "clratio/stream.hpp"
+#include "command.hpp"
 #include "error_counts.hpp"
 #include "interrupt.hpp"
 #include "progress_line.hpp"
-#include "tool.hpp"
 
 namespace tool {
 
@@ -19,7 +19,7 @@ struct StreamOptions {
     std::string seed = "1", rng = "philox";
     std::uint32_t id = 0;
 
-    void add_to(CLI::App& command);
+    void add_to(Command& command);
     clratio::Stream stream() const;
 };
 

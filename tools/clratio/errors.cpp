@@ -1,9 +1,8 @@
 // clratio errors: error samples of a model, counted on the device, and whether they follow the laws.
-#include <CLI/CLI.hpp>
-
 #include <algorithm>
 #include <cmath>
 
+#include "command.hpp"
 #include "error_options.hpp"
 
 namespace tool {
@@ -194,32 +193,30 @@ Examples:
 
 void add_errors(CLI::App& app, Run& run) {
     auto o = std::make_shared<Options>();
-    auto* command = app.add_subcommand("errors", "Sample an estimator's error, count it, and test it against the laws");
-    command->add_option("--mu", o->model.mu, "Mean of m")->required();
-    command->add_option("--tau", o->model.tau, "Mean of t")->required();
-    command->add_option("--sigma-m", o->model.sigma_m, "Standard deviation of one sample of m")->required();
-    command->add_option("--sigma-t", o->model.sigma_t, "Standard deviation of one sample of t")->required();
-    command->add_option("--rho", o->model.rho, "Correlation of m and t")->capture_default_str();
-    command->add_option("--n", o->n, "Samples in an estimate: one number, or several with commas")
-        ->delimiter(',')
-        ->type_name("WHOLE")
-        ->capture_default_str();
-    command->add_option("--count", o->count, "Errors to draw for each n, such as 1e9")->required()->type_name("WHOLE");
-    command->add_option("--first", o->first, "Index of the first one")->type_name("WHOLE")->capture_default_str();
-    command->add_option("--bins", o->bins, "Bins of equal width")->capture_default_str();
-    command->add_option("--range", o->range, "Ends of the bins, LO HI; write -0.5, not -.5")
-        ->expected(2)
-        ->capture_default_str();
-    o->stream.add_to(*command);
-    command->add_option("--estimator", o->estimator, "ratio, or mc (the plain mean)")
-        ->check(CLI::IsMember({"ratio", "mc"}))
-        ->type_name("WORD")
-        ->capture_default_str();
-    command->add_option("--csv", o->csv, "Write the histograms")->type_name("FILE");
-    command->add_option("--plot", o->plot, "Draw them and the laws with gnuplot")->type_name("FILE.svg|png");
-    command->add_flag("--json", o->json, "Print one JSON object instead of text");
-    command->footer(footer);
-    command->callback([=, &run] { run = [o] { return errors(*o); }; });
+    Command command(app, "errors", "Sample an estimator's error, count it, and test it against the laws");
+    command.option("--mu", o->model.mu, "Mean of m").required();
+    command.option("--tau", o->model.tau, "Mean of t").required();
+    command.option("--sigma-m", o->model.sigma_m, "Standard deviation of one sample of m").required();
+    command.option("--sigma-t", o->model.sigma_t, "Standard deviation of one sample of t").required();
+    command.option("--rho", o->model.rho, "Correlation of m and t").shows_default();
+    command.option("--n", o->n, "Samples in an estimate: one number, or several with commas")
+        .commas()
+        .type("WHOLE")
+        .shows_default();
+    command.option("--count", o->count, "Errors to draw for each n, such as 1e9").required().type("WHOLE");
+    command.option("--first", o->first, "Index of the first one").type("WHOLE").shows_default();
+    command.option("--bins", o->bins, "Bins of equal width").shows_default();
+    command.option("--range", o->range, "Ends of the bins, LO HI; write -0.5, not -.5").takes(2).shows_default();
+    o->stream.add_to(command);
+    command.option("--estimator", o->estimator, "ratio, or mc (the plain mean)")
+        .one_of({"ratio", "mc"})
+        .type("WORD")
+        .shows_default();
+    command.option("--csv", o->csv, "Write the histograms").type("FILE");
+    command.option("--plot", o->plot, "Draw them and the laws with gnuplot").type("FILE.svg|png");
+    command.flag("--json", o->json, "Print one JSON object instead of text");
+    command.footer(footer);
+    command.on_call(run, [o] { return errors(*o); });
 }
 
 }  // namespace tool

@@ -1,15 +1,13 @@
 // clratio estimators: bias, error and coverage of every estimator on models whose mean is known, by simulation.
-#include <CLI/CLI.hpp>
-
 #include <cmath>
 #include <filesystem>
 
 #include "clratio/combine.hpp"
+#include "command.hpp"
 #include "estimator_models.hpp"
 #include "output_file.hpp"
 #include "plot.hpp"
 #include "progress_line.hpp"
-#include "tool.hpp"
 
 namespace tool {
 namespace {
@@ -325,28 +323,27 @@ int estimators(const Options& options) {
 
 void add_estimators(CLI::App& app, Run& run) {
     auto o = std::make_shared<Options>();
-    auto* command =
-        app.add_subcommand("estimators", "Simulate every estimator: bias, error and coverage on models of known mean");
+    Command command(app, "estimators", "Simulate every estimator: bias, error and coverage on models of known mean");
     std::vector<std::string> names;
     for (const auto& m : pair_models()) names.push_back(m.name);
-    command->add_option("--models", o->models, "Which models")->type_name("NAME")->check(CLI::IsMember(names));
-    command->add_option("--samples", o->samples, "Samples for each column of a table")
-        ->type_name("WHOLE")
-        ->check(CLI::Range(std::uint64_t{1024}, std::uint64_t{1} << 40))
-        ->capture_default_str();
-    command->add_option("--most", o->most, "The largest N; N = 1, 2, 4, ..")
-        ->type_name("N")
-        ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 20))
-        ->capture_default_str();
-    command->add_option("--seed", o->seed, "Of the streams")->type_name("N")->capture_default_str();
-    command->add_flag("--unequal", o->unequal, "Batches of 1, 2, 3, 4, 1, .. samples; tables then go by total weight");
-    command->add_flag("--json", o->json, "Print one JSON array instead of tables");
-    command->add_option("-o,--output", o->folder, "Also draw estimators.svg and .png here")->type_name("DIR");
+    command.option("--models", o->models, "Which models").type("NAME").one_of(names);
+    command.option("--samples", o->samples, "Samples for each column of a table")
+        .type("WHOLE")
+        .within(1024, std::uint64_t{1} << 40)
+        .shows_default();
+    command.option("--most", o->most, "The largest N; N = 1, 2, 4, ..")
+        .type("N")
+        .within(1, std::uint64_t{1} << 20)
+        .shows_default();
+    command.option("--seed", o->seed, "Of the streams").type("N").shows_default();
+    command.flag("--unequal", o->unequal, "Batches of 1, 2, 3, 4, 1, .. samples; tables then go by total weight");
+    command.flag("--json", o->json, "Print one JSON array instead of tables");
+    command.option("-o,--output", o->folder, "Also draw estimators.svg and .png here").type("DIR");
     std::string footer = "Tables in Markdown, each number with its standard error.\n\nModels:\n";
     for (const auto& m : pair_models()) footer += fmt::format("  {:<3} {}\n", m.name, m.text);
-    command->footer(footer +
-                    "\nExamples:\n  clratio estimators --models A --samples 1000000\n  clratio estimators -o pictures");
-    command->callback([=, &run] { run = [o] { return estimators(*o); }; });
+    command.footer(footer +
+                   "\nExamples:\n  clratio estimators --models A --samples 1000000\n  clratio estimators -o pictures");
+    command.on_call(run, [o] { return estimators(*o); });
 }
 
 }  // namespace tool

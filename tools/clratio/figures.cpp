@@ -1,10 +1,9 @@
 // clratio figures: the supplement's Figures 1 and 2 with the laws that are right beside those that were printed.
 #include "figures.hpp"
 
-#include <CLI/CLI.hpp>
-
 #include <filesystem>
 
+#include "command.hpp"
 #include "error_options.hpp"
 
 namespace tool {
@@ -109,20 +108,17 @@ int figures(const Options& options) {
 
 void add_figures(CLI::App& app, Run& run) {
     auto o = std::make_shared<Options>();
-    auto* command =
-        app.add_subcommand("figures", "Draw the supplement's Figures 1 (laws) and 2 (samples), with their numbers");
-    command->add_option("-o,--output", o->folder, "Folder for figure1 and figure2, each .svg, .png and .csv")
-        ->required()
-        ->type_name("DIR");
-    command->add_option("--count", o->count, "Errors to draw for each of 14 histograms")
-        ->type_name("WHOLE")
-        ->capture_default_str();
-    o->stream.add_to(*command);
-    command->footer(
+    Command command(app, "figures", "Draw the supplement's Figures 1 (laws) and 2 (samples), with their numbers");
+    command.option("-o,--output", o->folder, "Folder for figure1 and figure2, each .svg, .png and .csv")
+        .required()
+        .type("DIR");
+    command.option("--count", o->count, "Errors to draw for each of 14 histograms").type("WHOLE").shows_default();
+    o->stream.add_to(command);
+    command.footer(
         "Density to the right, error upwards, one curve for each N = 1, 2, 4, .. 64, Monte Carlo and ratio side by\n"
         "side; mu = 0.5, tau = 1, sigma_m = 0.5, sigma_t = 0.35, rho = 0. Lines are the exact laws, dashes eq. (22) as\n"
         "the supplement prints it, dots the samples.\n\nExample: clratio figures -o figures --count 1e9");
-    command->callback([=, &run] { run = [o] { return figures(*o); }; });
+    command.on_call(run, [o] { return figures(*o); });
 }
 
 }  // namespace tool

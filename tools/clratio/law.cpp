@@ -1,12 +1,10 @@
 // clratio law: density and probability of an estimator's error.
 #include "clratio/law.hpp"
 
-#include <CLI/CLI.hpp>
-
 #include <cmath>
 #include <map>
 
-#include "tool.hpp"
+#include "command.hpp"
 
 namespace tool {
 namespace {
@@ -79,24 +77,23 @@ void add_law(CLI::App& app, Run& run) {
     auto& model = options->model;
     std::vector<std::string> names;
     for (const auto& [name, law] : laws) names.push_back(name);
-    auto* command = app.add_subcommand("law", "Print density and probability of an estimator's error, estimate - truth");
-    command
-        ->add_option("--law", options->law, "exact, published (eq. 22), mc (plain mean), integral (eq. 17), exact-integral")
-        ->check(CLI::IsMember(names))
-        ->type_name("LAW");
-    command->add_option("--mu", model.mu, "Mean of m")->required();
-    command->add_option("--tau", model.tau, "Mean of t")->required();
-    command->add_option("--sigma-m", model.sigma_m, "Standard deviation of one sample of m")->required();
-    command->add_option("--sigma-t", model.sigma_t, "Standard deviation of one sample of t")->required();
-    command->add_option("--rho", model.rho, "Correlation of m and t (0)");
-    command->add_option("--n", model.n, "Samples in an estimate (1)");
-    command->add_option("--x", options->x, "Errors to print, separated by blanks or commas; write -0.5, not -.5")
-        ->required()
-        ->delimiter(',');
-    command->add_flag("--json", options->json, "Print one JSON object; NaN is null");
-    command->footer("The published law has no finite integral where --sigma-t is not 0: its cdf is nan (null).\n\n"
-                    "Example: clratio law --law exact --mu .5 --tau 1 --sigma-m .5 --sigma-t .35 --n 4 --x -1 -0.5 0 .5 1");
-    command->callback([=, &run] { run = [options] { return law(*options); }; });
+    Command command(app, "law", "Print density and probability of an estimator's error, estimate - truth");
+    command.option("--law", options->law, "exact, published (eq. 22), mc (plain mean), integral (eq. 17), exact-integral")
+        .one_of(names)
+        .type("LAW");
+    command.option("--mu", model.mu, "Mean of m").required();
+    command.option("--tau", model.tau, "Mean of t").required();
+    command.option("--sigma-m", model.sigma_m, "Standard deviation of one sample of m").required();
+    command.option("--sigma-t", model.sigma_t, "Standard deviation of one sample of t").required();
+    command.option("--rho", model.rho, "Correlation of m and t (0)");
+    command.option("--n", model.n, "Samples in an estimate (1)");
+    command.option("--x", options->x, "Errors to print, separated by blanks or commas; write -0.5, not -.5")
+        .required()
+        .commas();
+    command.flag("--json", options->json, "Print one JSON object; NaN is null");
+    command.footer("The published law has no finite integral where --sigma-t is not 0: its cdf is nan (null).\n\n"
+                   "Example: clratio law --law exact --mu .5 --tau 1 --sigma-m .5 --sigma-t .35 --n 4 --x -1 -0.5 0 .5 1");
+    command.on_call(run, [options] { return law(*options); });
 }
 
 }  // namespace tool

@@ -1,10 +1,8 @@
 // clratio merge: the states of many machines to one.
-#include <CLI/CLI.hpp>
-
 #include "clratio/state.hpp"
+#include "command.hpp"
 #include "file_lock.hpp"
 #include "output_file.hpp"
-#include "tool.hpp"
 
 namespace tool {
 namespace {
@@ -69,12 +67,12 @@ Examples:
 
 void add_merge(CLI::App& app, Run& run) {
     auto o = std::make_shared<Options>();
-    auto* command = app.add_subcommand("merge", "Merge states of combine --state, from many machines, to one");
-    command->add_option("states", o->states, "The states")->required()->type_name("STATE.exr");
-    command->add_option("-o,--output", o->output, "The merged state")->required()->type_name("OUT.exr");
-    command->add_flag("--json", o->json, "Print one JSON object instead of text");
-    command->footer(footer);
-    command->callback([=, &run] { run = [o] { return merge(*o); }; });
+    Command command(app, "merge", "Merge states of combine --state, from many machines, to one");
+    command.option("states", o->states, "The states").required().type("STATE.exr");
+    command.option("-o,--output", o->output, "The merged state").required().type("OUT.exr");
+    command.flag("--json", o->json, "Print one JSON object instead of text");
+    command.footer(footer);
+    command.on_call(run, [o] { return merge(*o); });
 }
 
 }  // namespace tool

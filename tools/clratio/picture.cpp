@@ -1,13 +1,11 @@
 // clratio picture: images side by side as one PNG.
-#include <CLI/CLI.hpp>
-
 #include <cmath>
 
 #include "clratio/image.hpp"
+#include "command.hpp"
 #include "label.hpp"
 #include "output_file.hpp"
 #include "png.hpp"
-#include "tool.hpp"
 
 namespace tool {
 namespace {
@@ -73,17 +71,15 @@ int picture(const Options& options) {
 
 void add_picture(CLI::App& app, Run& run) {
     auto o = std::make_shared<Options>();
-    auto* command = app.add_subcommand("picture", "Put images side by side in one PNG");
-    command->add_option("images", o->images, "Images of one shape, Y or RGB")->required()->type_name("FILE");
-    command->add_option("-o,--output", o->output, "The PNG")->required()->type_name("OUT.png");
-    command->add_option("--exposure", o->exposure, "Brighten by this many stops")->type_name("STOPS")->capture_default_str();
-    command->add_option("--titles", o->titles, "One for each image, with commas between")
-        ->delimiter(',')
-        ->type_name("TEXT,...");
-    command->add_option("--layer", o->layer, "The layer to read where a file names none")->type_name("NAME");
-    command->footer("Values 0 to 1 get the sRGB transfer curve, others are clipped; a NaN or an infinity is magenta.\n\n"
-                    "Example: clratio picture mean.exr out.exr reference.exr -o side.png --titles mean,ratio,reference");
-    command->callback([=, &run] { run = [o] { return picture(*o); }; });
+    Command command(app, "picture", "Put images side by side in one PNG");
+    command.option("images", o->images, "Images of one shape, Y or RGB").required().type("FILE");
+    command.option("-o,--output", o->output, "The PNG").required().type("OUT.png");
+    command.option("--exposure", o->exposure, "Brighten by this many stops").type("STOPS").shows_default();
+    command.option("--titles", o->titles, "One for each image, with commas between").commas().type("TEXT,...");
+    command.option("--layer", o->layer, "The layer to read where a file names none").type("NAME");
+    command.footer("Values 0 to 1 get the sRGB transfer curve, others are clipped; a NaN or an infinity is magenta.\n\n"
+                   "Example: clratio picture mean.exr out.exr reference.exr -o side.png --titles mean,ratio,reference");
+    command.on_call(run, [o] { return picture(*o); });
 }
 
 }  // namespace tool

@@ -1,10 +1,9 @@
 // clratio render: a scene whose answer is known, as images that clratio combine takes.
-#include <CLI/CLI.hpp>
-
 #include <chrono>
 #include <filesystem>
 
 #include "clratio/image.hpp"
+#include "command.hpp"
 #include "error_options.hpp"
 #include "frame_size.hpp"
 #include "scene.hpp"
@@ -188,32 +187,24 @@ Examples:
 
 void add_render(CLI::App& app, Run& run) {
     auto o = std::make_shared<Options>();
-    auto* command = app.add_subcommand("render", "Render a foggy scene whose exact answer is known");
-    command->add_option("scene", o->scene, "A scene's name, or its FILE.json")->required()->type_name("SCENE");
-    command->add_option("-o,--output", o->folder, "Folder for the images")->required()->type_name("DIR");
-    command->add_option("-e,--estimator", o->estimator, "How distances are sampled")
-        ->type_name("WORD")
-        ->capture_default_str();
-    command->add_option("--pattern", o->pattern, "iid, stratified or offset")->type_name("WORD")->capture_default_str();
-    command->add_option("--spp", o->samples, "Samples of each pixel and batch")
-        ->check(CLI::Range(1u, 1u << 24))
-        ->type_name("N")
-        ->capture_default_str();
-    command->add_option("--batches", o->batches, "Pairs to write, each of a seed of its own")
-        ->check(CLI::Range(1u, 100000u))
-        ->type_name("B")
-        ->capture_default_str();
-    command->add_option("--seed", o->seed, "Seed of the first batch")->type_name("WHOLE")->capture_default_str();
-    command->add_option("--size", o->size, "Pixels")->type_name("WxH")->capture_default_str();
-    command->add_option("--rng", o->rng, "philox or pcg4d3x")
-        ->check(CLI::IsMember({"philox", "pcg4d3x"}))
-        ->type_name("WORD")
-        ->capture_default_str();
-    command->add_flag("--independent", o->independent, "t from samples of its own: for contrast, do not use it");
-    command->add_flag("--gray", o->gray, "Replace each extinction by their mean");
-    command->add_flag("--json", o->json, "Print one JSON object");
-    command->footer(footer);
-    command->callback([=, &run] { run = [o] { return render(*o); }; });
+    Command command(app, "render", "Render a foggy scene whose exact answer is known");
+    command.option("scene", o->scene, "A scene's name, or its FILE.json").required().type("SCENE");
+    command.option("-o,--output", o->folder, "Folder for the images").required().type("DIR");
+    command.option("-e,--estimator", o->estimator, "How distances are sampled").type("WORD").shows_default();
+    command.option("--pattern", o->pattern, "iid, stratified or offset").type("WORD").shows_default();
+    command.option("--spp", o->samples, "Samples of each pixel and batch").within(1, 1 << 24).type("N").shows_default();
+    command.option("--batches", o->batches, "Pairs to write, each of a seed of its own")
+        .within(1, 100000)
+        .type("B")
+        .shows_default();
+    command.option("--seed", o->seed, "Seed of the first batch").type("WHOLE").shows_default();
+    command.option("--size", o->size, "Pixels").type("WxH").shows_default();
+    command.option("--rng", o->rng, "philox or pcg4d3x").one_of({"philox", "pcg4d3x"}).type("WORD").shows_default();
+    command.flag("--independent", o->independent, "t from samples of its own: for contrast, do not use it");
+    command.flag("--gray", o->gray, "Replace each extinction by their mean");
+    command.flag("--json", o->json, "Print one JSON object");
+    command.footer(footer);
+    command.on_call(run, [o] { return render(*o); });
 }
 
 }  // namespace tool

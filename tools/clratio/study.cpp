@@ -1,10 +1,9 @@
 // clratio study: the errors of every estimator in every scene, against the number of samples, and the report on them.
-#include <CLI/CLI.hpp>
-
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
 
+#include "command.hpp"
 #include "error_options.hpp"
 #include "frame_size.hpp"
 #include "study_report.hpp"
@@ -293,27 +292,24 @@ Examples:
 
 void add_study(CLI::App& app, Run& run) {
     auto o = std::make_shared<Options>();
-    auto* command = app.add_subcommand("study", "Errors against samples, for all estimators and scenes, and a report");
-    command->add_option("-o,--output", o->folder, "Folder for the results; made where there is none")
-        ->required()
-        ->type_name("DIR");
-    command->add_option("--scenes", o->scenes, "Names or FILE.json, with commas between; all four without it")
-        ->delimiter(',')
-        ->type_name("SCENE,...");
-    command->add_option("--seeds", o->seeds, "Images of each estimator, seeds 0 to SEEDS - 1 (128; quick: 16)")
-        ->check(CLI::Range(1u, 1u << 20))
-        ->type_name("SEEDS");
-    command->add_option("--size", o->size, "Pixels (200x150; quick: 80x60)")->type_name("WxH");
-    command->add_flag("-q,--quick", o->quick, "16 images of 80x60 of each");
-    command->add_flag("--gray", o->gray, "Also each scene with one extinction for all channels");
-    command->add_option("--shard", o->shard, "Compute every N-th part only, beginning with part I; no report")
-        ->type_name("I/N");
-    command->add_option("--merge", o->merge, "Take finished parts from these folders first")->type_name("DIR...");
-    command->add_option("--lanes", o->lanes, "Lanes of the device's vectors: changes no result")->type_name("1|2|4|8|16");
-    command->add_flag("--no-report", o->no_report, "CSV files and verdicts only");
-    command->add_flag("--json", o->json, "Print one JSON object");
-    command->footer(footer);
-    command->callback([=, &run] { run = [o] { return study_command(*o); }; });
+    Command command(app, "study", "Errors against samples, for all estimators and scenes, and a report");
+    command.option("-o,--output", o->folder, "Folder for the results; made where there is none").required().type("DIR");
+    command.option("--scenes", o->scenes, "Names or FILE.json, with commas between; all four without it")
+        .commas()
+        .type("SCENE,...");
+    command.option("--seeds", o->seeds, "Images of each estimator, seeds 0 to SEEDS - 1 (128; quick: 16)")
+        .within(1, 1 << 20)
+        .type("SEEDS");
+    command.option("--size", o->size, "Pixels (200x150; quick: 80x60)").type("WxH");
+    command.flag("-q,--quick", o->quick, "16 images of 80x60 of each");
+    command.flag("--gray", o->gray, "Also each scene with one extinction for all channels");
+    command.option("--shard", o->shard, "Compute every N-th part only, beginning with part I; no report").type("I/N");
+    command.option("--merge", o->merge, "Take finished parts from these folders first").type("DIR...");
+    command.option("--lanes", o->lanes, "Lanes of the device's vectors: changes no result").type("1|2|4|8|16");
+    command.flag("--no-report", o->no_report, "CSV files and verdicts only");
+    command.flag("--json", o->json, "Print one JSON object");
+    command.footer(footer);
+    command.on_call(run, [o] { return study_command(*o); });
 }
 
 }  // namespace tool
