@@ -35,11 +35,14 @@
 // oclgrind cannot run what clang makes of it.
 #define CLR_FN static inline __attribute__((always_inline))
 #define CLR_RARE_FN static __attribute__((noinline))  // large, and seldom called
+// All that a work-item does: PoCL makes three functions of a kernel, and would compile three times what they inline.
+#define CLR_WORK_FN static __attribute__((noinline))
 // OpenCL's own prefetch() does nothing there. Any address will do.
 #define clr_prefetch(p) __builtin_prefetch((const void*)(size_t)(p), 0, 2)
 #else
 #define CLR_FN static inline
 #define CLR_RARE_FN static
+#define CLR_WORK_FN static inline
 #define clr_prefetch(p) ((void)(p))
 #endif
 #if defined(__clang__)
