@@ -311,19 +311,15 @@ kernel void clr_combine_batches(CLR_EACH_BATCH(CLR_BATCH_ARGUMENTS) clr_batches 
 
 #else
 
-CLR_WORK_FN void clr_add_span(clr_adder* work, clr_span span) {
-    const clr_batches batches = *work->batches;
-    clr_adder a = *work;
-    a.batches = &batches;
+// What a work-item adds.
+CLR_WORK_FN void clr_add_span(clr_adder* a, clr_span span) {
     for (ulong v = span.begin; v < span.end;) {
-        const bool in_block = clr_is_block(&a, v, span);
-        uint alone = in_block ? clr_add_block(&a, v * CLR_WIDTH) : 1u;
+        const bool in_block = clr_is_block(a, v, span);
+        uint alone = in_block ? clr_add_block(a, v * CLR_WIDTH) : 1u;
         for (ulong at = v * CLR_WIDTH; alone; alone >>= 1, at += CLR_WIDTH)
-            if (alone & 1u) clr_store_record(clr_add_vector(&a, at, !in_block), a.planes, a.state, at);
+            if (alone & 1u) clr_store_record(clr_add_vector(a, at, !in_block), a->planes, a->state, at);
         v += (in_block ? CLR_BLOCK : 1) * span.step;
     }
-    work->negative = a.negative;
-    work->skipped = a.skipped;
 }
 
 kernel void clr_add(CLR_EACH_BATCH(CLR_BATCH_ARGUMENTS) clr_batches batches, CLR_PLANE_ARGUMENTS(s), clr_state s_state,
