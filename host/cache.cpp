@@ -58,6 +58,12 @@ std::optional<std::vector<unsigned char>> load(const std::filesystem::path& path
                                       all.begin() + static_cast<std::ptrdiff_t>(body));
 }
 
+bool prepare(const std::filesystem::path& folder) {
+    std::error_code failed;
+    std::filesystem::create_directories(folder, failed);
+    return !failed && access(folder.c_str(), W_OK) == 0;
+}
+
 bool store(const std::filesystem::path& path, const std::string& key, const std::vector<unsigned char>& payload) {
     std::vector<unsigned char> all;
     append(all, magic, sizeof magic - 1);
@@ -66,13 +72,12 @@ bool store(const std::filesystem::path& path, const std::string& key, const std:
     const std::uint64_t sum = fnv1a(all.data(), all.size());
     append(all, &sum, sizeof sum);
 
-    std::error_code failed;
-    std::filesystem::create_directories(path.parent_path(), failed);
     auto temporary = path;
     temporary += "." + std::to_string(getpid());
     std::ofstream out(temporary, std::ios::binary);
     out.write(reinterpret_cast<const char*>(all.data()), static_cast<std::streamsize>(all.size()));
     out.close();
+    std::error_code failed;
     if (out) std::filesystem::rename(temporary, path, failed);
     if (!out || failed) {
         std::filesystem::remove(temporary, failed);

@@ -16,6 +16,8 @@ std::filesystem::path entry(const std::filesystem::path& folder, const std::stri
 
 /// The payload stored under `key`, or nothing where the entry is missing, damaged or another key's.
 std::optional<std::vector<unsigned char>> load(const std::filesystem::path& entry, const std::string& key);
+/// Makes the folder. False where it would take no entry.
+bool prepare(const std::filesystem::path& folder);
 /// Written beside the entry, then renamed over it. False where the disk does not take it: a cache may fail in silence.
 bool store(const std::filesystem::path& entry, const std::string& key, const std::vector<unsigned char>& payload);
 

@@ -143,11 +143,12 @@ namespace {
 // time is left to the next process.
 void save_binaries(const Engine::State& s) {
     const auto end = std::chrono::steady_clock::now() + std::chrono::seconds{1};
+    const auto folder = cache::folder();
     for (const auto& [name, built] : s.programs) {
         if (built.unsaved.empty()) continue;
-        if (std::chrono::steady_clock::now() > end) return;
+        if (std::chrono::steady_clock::now() > end || !cache::prepare(folder)) return;
         if (const auto binary = binary_of(built.program.get()); !binary.empty())
-            cache::store(cache::entry(cache::folder(), built.unsaved), built.unsaved, binary);
+            cache::store(cache::entry(folder, built.unsaved), built.unsaved, binary);
     }
 }
 

@@ -203,10 +203,21 @@ TEST(Cache, every_flipped_bit_and_every_cut_is_noticed) {
 }
 
 TEST(Cache, a_disk_that_takes_nothing_is_no_error) {
+    EXPECT_FALSE(cache::prepare("/proc/no/such/folder"));
     EXPECT_FALSE(cache::store("/proc/no/such/folder/entry.bin", "key", {1}));
     const Scratch scratch;
     const Environment pocl("POCL_CACHE_DIR", scratch / "."), set("XDG_CACHE_HOME", "/proc/no/such/folder");
     EXPECT_EQ(small_job(Engine()), small_answer);
+}
+
+TEST(Cache, its_folder_is_made_where_it_can_be) {
+    const Scratch scratch;
+    const std::filesystem::path folder = scratch / "a/b";
+    EXPECT_TRUE(cache::prepare(folder));
+    EXPECT_TRUE(cache::prepare(folder));
+    EXPECT_TRUE(cache::store(cache::entry(folder, "key"), "key", {1}));
+    EXPECT_FALSE(cache::prepare(entries(folder).front())) << "a file";
+    EXPECT_FALSE(cache::prepare(entries(folder).front() / "clratio")) << "in a file";
 }
 
 // The driver's own static parts may go before the engine does: nothing may be asked of them then.

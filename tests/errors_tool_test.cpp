@@ -267,6 +267,7 @@ TEST(Errors, a_full_disk_is_said_and_leaves_no_file) {
     const Scratch scratch;
     clratio::test::Surroundings small;
     small.file_size_limit = 4096;
+    counted({"--count", "1e5"});  // a program that is not built yet needs files of its own
     expect_refused(model + Words{"--count", "1e5", "--csv", scratch / "h.csv"}, 1, "h.csv: cannot be written", small);
     EXPECT_EQ(scratch.files(), 0u);
 }

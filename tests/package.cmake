@@ -4,7 +4,7 @@ function(clratio_package_test step)
     -DSOURCE=${PROJECT_SOURCE_DIR} -DGENERATOR=${CMAKE_GENERATOR} -DCOMPILER=${CMAKE_CXX_COMPILER}
     -DLAUNCHER=${CMAKE_CXX_COMPILER_LAUNCHER} -P ${CMAKE_CURRENT_SOURCE_DIR}/package_test.cmake)
   # They take long, and come last where ctest knows no times yet: then one would run alone.
-  set_tests_properties(package.${step} PROPERTIES ENVIRONMENT ${caches} COST 60)
+  set_tests_properties(package.${step} PROPERTIES ${caches} COST 60)
 endfunction()
 
 clratio_package_test(readme)

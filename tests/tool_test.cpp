@@ -13,6 +13,7 @@
 #include "support/scratch.hpp"
 
 using namespace clratio;
+using clratio::test::bytes_of;
 using clratio::test::Said;
 using clratio::test::Scratch;
 using nlohmann::json;
@@ -276,6 +277,28 @@ TEST(Tool, nonfinite_inputs_follow_the_policy) {
     std::filesystem::remove(scratch / "o.exr");
     expect_refused(words + Words{"--nonfinite", "fail"}, 1, scratch / "bad.exr" + ": nan at column 2, row 1, channel G");
     EXPECT_FALSE(std::filesystem::exists(scratch / "o.exr"));
+}
+
+TEST(Tool, the_next_run_starts_from_the_kept_program) {
+    const Scratch scratch;
+    const std::string kept = scratch / "cache";
+    const auto run = [&](const std::string& out) {
+        const Said said = clratio_tool(pairs("area", 2) + Words{"--tau", reference("area", "t"), "-o", scratch / out},
+                                       {.environment = {{"XDG_CACHE_HOME", kept}}});
+        EXPECT_EQ(said.code, 0) << said.err;
+        return bytes_of(scratch / out);
+    };
+    const auto entry_times = [&] {
+        std::map<std::string, std::filesystem::file_time_type> times;
+        for (const auto& f : std::filesystem::directory_iterator(kept + "/clratio"))
+            times[f.path().filename()] = f.last_write_time();
+        return times;
+    };
+    const std::string first = run("first.exr");
+    const auto times = entry_times();
+    EXPECT_EQ(times.size(), 1u);
+    EXPECT_EQ(run("second.exr"), first);
+    EXPECT_EQ(entry_times(), times);
 }
 
 TEST(Tool, usage_errors_exit_2) {
