@@ -89,28 +89,40 @@ CLR_FN void clr_fixed_tell(const clr_fixed_tally* tally, global ulong* rows) {
     rows[CLR_FIXED_TALLY_OUTSIDE] += clr_sum_lanes(tally->outside);
 }
 
-kernel void clr_add_fixed(CLR_EACH_BATCH(CLR_BATCH_ARGUMENTS) clr_fixed_batches batches, CLR_FIXED_ARGUMENTS(s),
-                          global ulong* rows, clr_range range) {
-    global const float* const m_of[] = {CLR_EACH_BATCH(CLR_M)};
-    global const float* const t_of[] = {CLR_EACH_BATCH(CLR_T)};
-    const clr_fixed_planes planes = CLR_FIXED_PLANES(s);
-    const float scale = s_state.scale;
-    const clr_real limit = (clr_real)(s_state.limit);
+// What a work-item adds, and what it counts.
+typedef struct {
+    global const float *m[CLR_FIXED_BATCHES_PER_LAUNCH], *t[CLR_FIXED_BATCHES_PER_LAUNCH];
+    const clr_fixed_batches* batches;
+    clr_fixed_planes planes;
+    clr_fixed_state state;
+    ulong count;
+    clr_fixed_tally tally;
+} clr_fixed_adder;
+
+CLR_WORK_FN void clr_add_fixed_span(clr_fixed_adder* a, clr_span span) {
+    const clr_real limit = (clr_real)(a->state.limit), scale = (clr_real)(a->state.scale);
     clr_fixed_tally tally = clr_fixed_tally_zero();
-    const clr_span span = clr_my_span(range);
     for (ulong v = span.begin; v < span.end; v += span.step) {
         const ulong first = v * CLR_WIDTH;
         clr_fixed_run run = clr_fixed_run_zero();
-        for (uint k = 0; k < batches.count; ++k) {
-            const clr_real m = clr_load_view(m_of[k], batches.of[k].m, first, range.count);
-            const clr_real t = clr_load_view(t_of[k], batches.of[k].t, first, range.count);
+        for (uint k = 0; k < a->batches->count; ++k) {
+            const clr_real m = clr_load_view(a->m[k], a->batches->of[k].m, first, a->count);
+            const clr_real t = clr_load_view(a->t[k], a->batches->of[k].t, first, a->count);
             clr_fixed_count(&tally, m, t, limit);
-            run = clr_fixed_take(run, m, t, (clr_real)(scale), limit);
+            run = clr_fixed_take(run, m, t, scale, limit);
         }
-        const clr_fixed sum = clr_load_fixed(planes, s_state, first);
-        clr_store_fixed(clr_fixed_add(sum, run, batches.weight), planes, s_state, first);
+        const clr_fixed sum = clr_load_fixed(a->planes, a->state, first);
+        clr_store_fixed(clr_fixed_add(sum, run, a->batches->weight), a->planes, a->state, first);
     }
-    clr_fixed_tell(&tally, rows);
+    a->tally = tally;
+}
+
+kernel void clr_add_fixed(CLR_EACH_BATCH(CLR_BATCH_ARGUMENTS) clr_fixed_batches batches, CLR_FIXED_ARGUMENTS(s),
+                          global ulong* rows, clr_range range) {
+    clr_fixed_adder a = {
+        {CLR_EACH_BATCH(CLR_M)}, {CLR_EACH_BATCH(CLR_T)}, &batches, CLR_FIXED_PLANES(s), s_state, range.count};
+    clr_add_fixed_span(&a, clr_my_span(range));
+    clr_fixed_tell(&a.tally, rows);
 }
 
 kernel void clr_merge_fixed(CLR_FIXED_ARGUMENTS(a), CLR_FIXED_ARGUMENTS(b), global ulong* a_rows, global const ulong* b_rows,
@@ -125,22 +137,32 @@ kernel void clr_merge_fixed(CLR_FIXED_ARGUMENTS(a), CLR_FIXED_ARGUMENTS(b), glob
     }
 }
 
+// What a work-item reads out.
+typedef struct {
+    clr_fixed_planes from;
+    clr_fixed_state state;
+    clr_planes to;
+    clr_state to_state;
+} clr_fixed_read;
+
+CLR_WORK_FN void clr_read_fixed_span(const clr_fixed_read* r, clr_span span) {
+    for (ulong v = span.begin; v < span.end; v += span.step) {
+        const ulong first = v * CLR_WIDTH;
+        const clr_fixed sum = clr_load_fixed(r->from, r->state, first);
+        clr_store_moments(clr_fixed_moments(sum, r->state.resolution), r->to, r->to_state, first);
+        if (r->state.per_value)
+            clr_store_evidence(clr_fixed_weight(sum.weight), clr_both(0.0f, 0.0f), sum.batches, r->to, r->to_state, first);
+    }
+}
+
 kernel void clr_read_fixed(CLR_FIXED_ARGUMENTS(s), global const ulong* from_rows, CLR_PLANE_ARGUMENTS(to),
                            clr_state to_state, global ulong* to_rows, ulong items, clr_range range) {
     for (ulong i = get_global_id(0); i < items; i += get_global_size(0)) {
         to_rows[i * CLR_TALLY_ADD + CLR_TALLY_NEGATIVE] = from_rows[i * CLR_FIXED_TALLY + CLR_FIXED_TALLY_NEGATIVE];
         to_rows[i * CLR_TALLY_ADD + CLR_TALLY_SKIPPED] = from_rows[i * CLR_FIXED_TALLY + CLR_FIXED_TALLY_SKIPPED];
     }
-    const clr_fixed_planes from = CLR_FIXED_PLANES(s);
-    const clr_planes planes = CLR_PLANES(to);
-    const clr_span span = clr_my_span(range);
-    for (ulong v = span.begin; v < span.end; v += span.step) {
-        const ulong first = v * CLR_WIDTH;
-        const clr_fixed sum = clr_load_fixed(from, s_state, first);
-        clr_store_moments(clr_fixed_moments(sum, s_state.resolution), planes, to_state, first);
-        if (s_state.per_value)
-            clr_store_evidence(clr_fixed_weight(sum.weight), clr_both(0.0f, 0.0f), sum.batches, planes, to_state, first);
-    }
+    const clr_fixed_read work = {CLR_FIXED_PLANES(s), s_state, CLR_PLANES(to), to_state};
+    clr_read_fixed_span(&work, clr_my_span(range));
 }
 
 // What the state would count of one batch, without adding it.

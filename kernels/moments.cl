@@ -26,7 +26,16 @@ typedef struct {
     clr_uint negative, skipped;
 } clr_adder;
 
-CLR_FN bool clr_skips(const clr_adder* a) { return (a->state.options & CLR_STATE_PER_VALUE) != 0; }
+CLR_FN clr_state clr_state_of(const clr_adder* a) {
+    clr_state s = a->state;
+#if defined(CLR_STATE_OPTIONS)
+    s.options = CLR_STATE_OPTIONS;
+#endif
+    return s;
+}
+
+CLR_FN bool clr_has(const clr_adder* a, uint option) { return (clr_state_of(a).options & option) != 0; }
+CLR_FN bool clr_skips(const clr_adder* a) { return clr_has(a, CLR_STATE_PER_VALUE); }
 
 // A block of vectors stays in the first cache while the batches go over it one by one: neighbours do not wait for each
 // other, and few streams run through memory at a time. GPUs keep one vector in registers.
@@ -58,18 +67,18 @@ CLR_FN clr_state clr_grown(const clr_adder* a) {
     const clr_batch last = a->batches->of[a->batches->count - 1];
     const clr_group group = {a->state.group.batches + a->batches->count, last.sum_hi, last.sum_lo, last.sum2_hi,
                              last.sum2_lo};
-    clr_state grown = a->state;
+    clr_state grown = clr_state_of(a);
     grown.group = group;
     return grown;
 }
 
 // Of a vector whose values all have the same evidence.
 CLR_FN void clr_put_back(clr_moments moments, const clr_adder* a, ulong at) {
-    clr_store_moments(moments, a->planes, a->state, at);
+    clr_store_moments(moments, a->planes, clr_state_of(a), at);
     if (!clr_skips(a)) return;
     const clr_group g = clr_grown(a).group;
     clr_store_evidence(clr_both(g.weight_hi, g.weight_lo), clr_both(g.weight2_hi, g.weight2_lo), (clr_uint)(g.batches),
-                       a->planes, a->state, at);
+                       a->planes, clr_state_of(a), at);
 }
 
 // What is fetched ahead together: a cache line of values, or a vector where that is more or is the block.
@@ -107,16 +116,17 @@ CLR_FN uint clr_pass(const bool is_first, const bool is_last, uint k, clr_block*
     clr_uint signs = *all_signs;
     uint doubtful = 0;
     for (uint chunk = 0; chunk < CLR_BLOCK * CLR_WIDTH; chunk += CLR_CHUNK) {
-        clr_prefetch_chunk(m_from + ahead + chunk, t_from + ahead + chunk, plane, a->state, first + ahead + chunk);
+        clr_prefetch_chunk(m_from + ahead + chunk, t_from + ahead + chunk, plane, clr_state_of(a), first + ahead + chunk);
         for (uint c = chunk; c < chunk + CLR_CHUNK; c += CLR_WIDTH) {
             const uint v = c / CLR_WIDTH;
             const clr_real m = clr_load(m_from + c), t = clr_load(t_from + c);
             signs |= clr_bits(m) | clr_bits(t);
-            const clr_moments before = is_first ? clr_load_moments(a->planes, a->state, first + c) : block->moments[v];
+            const clr_moments before =
+                is_first ? clr_load_moments(a->planes, clr_state_of(a), first + c) : block->moments[v];
             const clr_moments moments = clr_moments_add(before, m, t, e, index);
             if (!is_last)
                 block->moments[v] = moments;
-            else if (clr_skips(a) && clr_in_doubt(moments, clr_lost_before(a->planes, a->state, first + c)))
+            else if (clr_skips(a) && clr_in_doubt(moments, clr_lost_before(a->planes, clr_state_of(a), first + c)))
                 doubtful |= 1u << v;
             else
                 clr_put_back(moments, a, first + c);
@@ -165,7 +175,7 @@ CLR_FN uint clr_fill_block(const bool keeps, clr_block* block, clr_adder* a, ulo
     if (clr_any(signs >= (clr_uint)(0x80000000u))) clr_count_negative(a, first);
     uint doubtful = 0;
     for (uint v = 0; clr_skips(a) && v < CLR_BLOCK; ++v) {
-        const clr_real lost = keeps ? clr_lost_before(a->planes, a->state, first + v * CLR_WIDTH) : (clr_real)(0.0f);
+        const clr_real lost = keeps ? clr_lost_before(a->planes, clr_state_of(a), first + v * CLR_WIDTH) : (clr_real)(0.0f);
         doubtful |= clr_in_doubt(block->moments[v], lost) ? 1u << v : 0u;
     }
     return doubtful;
@@ -174,7 +184,7 @@ CLR_FN uint clr_fill_block(const bool keeps, clr_block* block, clr_adder* a, ulo
 // Any vector: each value has a share of its own in each batch.
 CLR_FN clr_record clr_add_vector(clr_adder* a, ulong first, const bool count_negative) {
     const clr_real zero = (clr_real)(0.0f);
-    clr_record r = clr_load_record(a->planes, a->state, first);
+    clr_record r = clr_load_record(a->planes, clr_state_of(a), first);
     for (uint k = 0; k < a->batches->count; ++k) {
         const clr_batch batch = a->batches->of[k];
         const clr_real m = clr_load_view(a->m[k], batch.m, first, a->count);
@@ -185,9 +195,9 @@ CLR_FN clr_record clr_add_vector(clr_adder* a, ulong first, const bool count_neg
         const clr_two sum = clr_two_add(r.weight, added);
         const clr_entry e = clr_entry_make(r.weight, added, sum);
         r.moments = clr_moments_add(r.moments, bad ? zero : m, bad ? zero : t, e, a->state.group.batches + k);
-        if (a->state.options & CLR_STATE_RATIOS) r.ratios = clr_ratios_add(r.ratios, bad ? zero : m, bad ? zero : t, e);
+        if (clr_has(a, CLR_STATE_RATIOS)) r.ratios = clr_ratios_add(r.ratios, bad ? zero : m, bad ? zero : t, e);
         r.weight = sum;
-        if (a->state.options & CLR_STATE_RELIABILITY) r.weight2 = clr_two_add(r.weight2, clr_two_square(added));
+        if (clr_has(a, CLR_STATE_RELIABILITY)) r.weight2 = clr_two_add(r.weight2, clr_two_square(added));
         r.batches += clr_one_where(!bad);
         if (count_negative) a->negative += clr_one_where(m < zero) + clr_one_where(t < zero);
         a->skipped += clr_one_where(bad);
@@ -209,7 +219,7 @@ CLR_FN clr_adder clr_adder_make(const clr_batches* batches, clr_planes planes, c
     a.t[k] = t##k;
 
 CLR_FN bool clr_is_block(const clr_adder* a, ulong v, clr_span span) {
-    return a->batches->packed && !(a->state.options & CLR_STATE_RATIOS) && v + CLR_BLOCK <= span.end &&
+    return a->batches->packed && !clr_has(a, CLR_STATE_RATIOS) && v + CLR_BLOCK <= span.end &&
            (v + CLR_BLOCK) * CLR_WIDTH <= a->count;
 }
 
@@ -222,7 +232,7 @@ CLR_FN void clr_store_add_tally(const clr_adder* a, global ulong* rows) {
 #if defined(CLR_ASKED)
 
 typedef struct {
-    clr_reading reading;
+    const clr_reading* reading;
     global const float *tau, *quantiles;
     clr_outputs to;
     clr_evidence whole;  // of a value that has lost no batch
@@ -231,16 +241,17 @@ typedef struct {
 
 // As clr_combine_moments reads it out of the planes.
 CLR_FN void clr_read_record(clr_record r, clr_evidence n, clr_reader* reader, ulong first, ulong count) {
-    clr_question ask = reader->reading.ask;
+    clr_question ask = reader->reading->ask;
     ask.estimator = CLR_ESTIMATOR;
     ask.outputs = CLR_ASKED;
-    const clr_real control = clr_load_view(reader->tau, reader->reading.tau, first, count);
-    const clr_estimate e = clr_read_out(clr_joint_of(r, n, control, ask.zero_policy), reader->reading.added, control,
-                                        clr_quantile_for(r.batches, reader->reading, reader->quantiles), ask);
-    clr_write_reading(e, reader->reading, ask.outputs, reader->to, &reader->tally, first, count);
+    const clr_real control = clr_load_view(reader->tau, reader->reading->tau, first, count);
+    const clr_estimate e = clr_read_out(clr_joint_of(r, n, control, ask.zero_policy), reader->reading->added, control,
+                                        clr_quantile_for(r.batches, *reader->reading, reader->quantiles), ask);
+    clr_write_reading(e, *reader->reading, ask.outputs, reader->to, &reader->tally, first, count);
 }
 
-CLR_FN void clr_add_and_read(const bool keeps, clr_adder* a, clr_reader* reader, clr_span span) {
+// What a work-item adds and reads out.
+CLR_WORK_FN void clr_add_and_read(const bool keeps, clr_adder* a, clr_reader* reader, clr_span span) {
     const clr_state grown = clr_grown(a);
     clr_record whole;
     whole.weight = clr_both(grown.group.weight_hi, grown.group.weight_lo);
@@ -258,8 +269,8 @@ CLR_FN void clr_add_and_read(const bool keeps, clr_adder* a, clr_reader* reader,
             clr_evidence n = reader->whole;
             if (alone >> k & 1u) {
                 r = clr_add_vector(a, at, !in_block);
-                if (keeps) clr_store_record(r, a->planes, a->state, at);
-                if (clr_skips(a)) n = clr_evidence_of(r.batches, r.weight, r.weight2, reader->reading.ask.reliability);
+                if (keeps) clr_store_record(r, a->planes, clr_state_of(a), at);
+                if (clr_skips(a)) n = clr_evidence_of(r.batches, r.weight, r.weight2, reader->reading->ask.reliability);
             } else {
                 r.moments = block.moments[k];
                 if (keeps) clr_put_back(r.moments, a, at);
@@ -271,7 +282,7 @@ CLR_FN void clr_add_and_read(const bool keeps, clr_adder* a, clr_reader* reader,
 }
 
 #define CLR_MAKE_READER(a)                                                                                                  \
-    clr_reader reader = {reading,                                                                                           \
+    clr_reader reader = {&reading,                                                                                          \
                          tau,                                                                                               \
                          quantiles,                                                                                         \
                          CLR_OUTPUTS,                                                                                       \
@@ -283,7 +294,6 @@ CLR_FN void clr_add_and_read(const bool keeps, clr_adder* a, clr_reader* reader,
 kernel void clr_add_and_combine(CLR_EACH_BATCH(CLR_BATCH_ARGUMENTS) clr_batches batches, CLR_PLANE_ARGUMENTS(s),
                                 clr_state s_state, global ulong* add_rows, CLR_READING_ARGUMENTS, clr_range range) {
     const clr_planes planes = CLR_PLANES(s);
-    s_state.options = CLR_STATE_OPTIONS;
     clr_adder a = clr_adder_make(&batches, planes, s_state, range.count);
     CLR_EACH_BATCH(CLR_TAKE_INPUT)
     CLR_MAKE_READER(a)
@@ -317,7 +327,7 @@ CLR_WORK_FN void clr_add_span(clr_adder* a, clr_span span) {
         const bool in_block = clr_is_block(a, v, span);
         uint alone = in_block ? clr_add_block(a, v * CLR_WIDTH) : 1u;
         for (ulong at = v * CLR_WIDTH; alone; alone >>= 1, at += CLR_WIDTH)
-            if (alone & 1u) clr_store_record(clr_add_vector(a, at, !in_block), a->planes, a->state, at);
+            if (alone & 1u) clr_store_record(clr_add_vector(a, at, !in_block), a->planes, clr_state_of(a), at);
         v += (in_block ? CLR_BLOCK : 1) * span.step;
     }
 }
