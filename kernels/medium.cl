@@ -49,11 +49,10 @@ kernel void clr_medium_exact(global float* out, clr_layout layout, clr_medium s,
     }
 }
 
-// Means of m and t. Values of level k begin at k * level_values.
-kernel void clr_medium_render(global float* m, clr_layout m_layout, global float* t, clr_layout t_layout, clr_medium s,
-                              global const float* occluders, clr_stream stream, clr_sampler sampler, uint levels,
-                              uint first_row, ulong level_pixels, clr_range range) {
-    const clr_span span = clr_my_span(range);
+// What a work-item renders.
+CLR_WORK_FN void clr_render_span(global float* m, clr_layout m_layout, global float* t, clr_layout t_layout, clr_medium s,
+                                 global const float* occluders, clr_stream stream, clr_sampler sampler, uint levels,
+                                 uint first_row, ulong level_pixels, clr_span span) {
     clr_stream other = stream;
     other.id |= CLR_INDEPENDENT;
     uint list[CLR_SHADOW_LIST];
@@ -88,6 +87,14 @@ kernel void clr_medium_render(global float* m, clr_layout m_layout, global float
             clr_store_channels(means.t, s, t, t_layout, first, p.lanes);
         }
     }
+}
+
+// Means of m and t. Values of level k begin at k * level_values.
+kernel void clr_medium_render(global float* m, clr_layout m_layout, global float* t, clr_layout t_layout, clr_medium s,
+                              global const float* occluders, clr_stream stream, clr_sampler sampler, uint levels,
+                              uint first_row, ulong level_pixels, clr_range range) {
+    clr_render_span(m, m_layout, t, t_layout, s, occluders, stream, sampler, levels, first_row, level_pixels,
+                    clr_my_span(range));
 }
 
 // Errors counted and summed, no image stored. A task is one row of the image of one seed; its sums are its own, and the
@@ -161,17 +168,15 @@ CLR_FN void clr_tally_level(clr_tally tally, global uint* counters, clr_wide* su
     }
 }
 
-// Tasks first_task .. of a work-group: task = seed * rows + row. counters: levels * 6 rows of slots for each work-group.
-kernel void clr_medium_tally(global uint* counters, global ulong* totals, clr_medium s, global const float* occluders,
-                             global const float* shares, clr_stream stream, clr_sampler sampler, clr_tally tally,
-                             uint first_row, uint rows, ulong tasks, ulong per_group) {
+// The tasks of a work-item: task = seed * rows + row.
+CLR_WORK_FN void clr_tally_tasks(global uint* own, global ulong* totals, clr_medium s, global const float* occluders,
+                                 global const float* shares, clr_stream stream, clr_sampler sampler, clr_tally tally,
+                                 uint first_row, uint rows, clr_span tasks) {
     const uint slots = tally.bins.count + CLR_ERROR_SLOTS, values = tally.levels * CLR_LEVEL_VALUES;
-    global uint* own = counters + get_group_id(0) * (ulong)values * slots;
-    const ulong begin = min(tasks, get_group_id(0) * per_group), end = min(tasks, begin + per_group);
     uint list[CLR_SHADOW_LIST];
     clr_shadows shadows;
     shadows.list = list;
-    for (ulong task = begin + get_local_id(0); task < end; task += get_local_size(0)) {
+    for (ulong task = tasks.begin; task < tasks.end; task += tasks.step) {
         clr_wide sums[2 * CLR_MOST_LEVELS * CLR_LEVEL_VALUES];
         for (uint i = 0; i < 2 * values; ++i) sums[i] = (clr_wide)(0);
         const uint row = (uint)(task % rows);
@@ -203,4 +208,15 @@ kernel void clr_medium_tally(global uint* counters, global ulong* totals, clr_me
         }
         for (uint i = 0; i < 2 * values; ++i) totals[task * 2 * values + i] = clr_lane_sum(sums[i]);
     }
+}
+
+// counters: levels * 6 rows of slots for each work-group, which has per_group tasks.
+kernel void clr_medium_tally(global uint* counters, global ulong* totals, clr_medium s, global const float* occluders,
+                             global const float* shares, clr_stream stream, clr_sampler sampler, clr_tally tally,
+                             uint first_row, uint rows, ulong tasks, ulong per_group) {
+    const ulong row = (ulong)(tally.levels * CLR_LEVEL_VALUES) * (tally.bins.count + CLR_ERROR_SLOTS);
+    const ulong begin = min(tasks, get_group_id(0) * per_group);
+    const clr_span own = {begin + get_local_id(0), min(tasks, begin + per_group), get_local_size(0)};
+    clr_tally_tasks(counters + get_group_id(0) * row, totals, s, occluders, shares, stream, sampler, tally, first_row, rows,
+                    own);
 }
