@@ -26,6 +26,7 @@ typedef struct {
     clr_uint negative, skipped;
 } clr_adder;
 
+// Its options are constants where the program knows them, which a pointer hides.
 CLR_FN clr_state clr_state_of(const clr_adder* a) {
     clr_state s = a->state;
 #if defined(CLR_STATE_OPTIONS)

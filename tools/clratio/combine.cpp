@@ -1,5 +1,6 @@
 // clratio combine: batches of image pairs to one image.
 #include <algorithm>
+#include <thread>
 
 #include "combine_run.hpp"
 #include "combine_watch.hpp"
@@ -24,8 +25,12 @@ std::vector<Job> missing_in(const CombineRun& run, std::vector<Job> jobs) {
 }
 
 int combine_without_state(const Options& options) {
-    PairReader reader(jobs_of(options), options.layer);  // before the device is opened, which takes as long
+    // Images are decoded while the device is opened, which takes as long and has a processor to itself.
+    const unsigned processors = std::thread::hardware_concurrency();
+    clratio::set_image_threads(std::max(2u, processors) - 1);
+    PairReader reader(jobs_of(options), options.layer);
     CombineRun run(options);
+    clratio::set_image_threads(processors);
     auto pairs = reader.next();
     if (reader.done() && !run.has_groups()) {
         run.read_out_at_once(pairs);
