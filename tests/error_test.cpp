@@ -9,6 +9,7 @@
 
 #include "clratio/device/error.h"
 #include "embedded.hpp"
+#include "support/oclgrind.hpp"
 #include "support/raw_kernel.hpp"
 #include "support/shapes.hpp"
 
@@ -95,18 +96,37 @@ TEST(Error, samples_have_the_same_bits_in_every_shape_and_range) {
     }
 }
 
+namespace {
+
+void expect_the_hosts_samples(const Engine& engine, const Canonical& law, const Stream& stream, std::size_t count) {
+    std::vector<float> f(count);
+    std::vector<double> d(count), want(count);
+    error_samples(engine, law, stream, 11, f);
+    error_samples(engine, law, stream, 11, d);
+    for (std::size_t i = 0; i < count; ++i) want[i] = error_sample_double(law, stream, 11 + i);
+    EXPECT_TRUE(same_bits(f, host_samples(law, stream, 11, count)));
+    EXPECT_TRUE(same_bits(d, want));
+}
+
+}  // namespace
+
 TEST(Error, every_law_has_the_hosts_bits_in_float_and_double) {
-    constexpr std::size_t count = 5000;
     const Engine engine;
-    for (const auto& law : laws()) {
-        std::vector<float> f(count);
-        std::vector<double> d(count), want(count);
-        error_samples(engine, law, {2}, 11, f);
-        error_samples(engine, law, {2}, 11, d);
-        for (std::size_t i = 0; i < count; ++i) want[i] = error_sample_double(law, {2}, 11 + i);
-        EXPECT_TRUE(same_bits(f, host_samples(law, {2}, 11, count)));
-        EXPECT_TRUE(same_bits(d, want));
-    }
+    for (const auto& law : laws()) expect_the_hosts_samples(engine, law, {2}, 5000);
+}
+
+TEST(ErrorSmall, every_kernel) {
+    for (const auto generator : {Generator::philox, Generator::pcg4d3x})
+        for (const auto& shape : smallest_shapes())
+            expect_the_hosts_samples(Engine(shape.options), laws()[1], {2, 0, generator}, 21);
+}
+
+TEST(Error, kernels_are_clean_under_oclgrind) {
+    const auto report = under_oclgrind("error_test", "ErrorSmall.*");
+    if (!report) GTEST_SKIP() << "oclgrind is not installed (Debian: apt install oclgrind)";
+    EXPECT_EQ(report->status, 0) << report->output;
+    EXPECT_EQ(report->complaints(), 0) << report->output;
+    EXPECT_NE(report->output.find("[  PASSED  ] 1 test."), std::string::npos) << report->output;
 }
 
 TEST(Error, a_range_is_its_parts) {

@@ -11,6 +11,7 @@
 
 #include "clratio/device/quantile.h"
 #include "embedded.hpp"
+#include "support/oclgrind.hpp"
 #include "support/raw_kernel.hpp"
 #include "support/shapes.hpp"
 #include "support/theory.hpp"
@@ -316,31 +317,52 @@ TEST(Stream, normals_have_the_same_bits_in_every_shape_and_range) {
     }
 }
 
+namespace {
+
+void expect_the_hosts_fills(const Shape& shape, const Stream& stream, std::uint64_t first, std::size_t count) {
+    const Engine engine(shape.options);
+    std::vector<std::uint32_t> w(count), want_w(count);
+    std::vector<float> u(count), want_u(count), n(count), want_n(count);
+    std::vector<double> d(count), want_d(count), z(count), want_z(count);
+    fill_words(engine, stream, first, w);
+    fill_uniforms(engine, stream, first, u);
+    fill_normals(engine, stream, first, n);
+    fill_uniforms(engine, stream, first, d);
+    fill_normals(engine, stream, first, z);
+    for (std::size_t i = 0; i < count; ++i) {
+        want_w[i] = word(stream, first + i);
+        want_u[i] = uniform(stream, first + i);
+        want_n[i] = normal(stream, first + i);
+        want_d[i] = uniform_double(stream, first + i);
+        want_z[i] = normal_double(stream, first + i);
+    }
+    EXPECT_TRUE(same_bits(w, want_w)) << shape.name;
+    EXPECT_TRUE(same_bits(u, want_u)) << shape.name;
+    EXPECT_TRUE(same_bits(n, want_n)) << shape.name;
+    EXPECT_TRUE(same_bits(d, want_d)) << shape.name;
+    EXPECT_TRUE(same_bits(z, want_z)) << shape.name;
+}
+
+}  // namespace
+
 TEST(Stream, all_fills_have_the_hosts_bits) {
     constexpr std::size_t count = 517;
-    const Stream stream{2, 9};
-    for (const Shape& shape : some_shapes()) {
-        const Engine engine(shape.options);
-        for (const std::uint64_t first : {std::uint64_t{0}, (std::uint64_t{1} << 33) - 259, end_of_stream - count}) {
-            std::vector<std::uint32_t> w(count), want_w(count);
-            std::vector<float> u(count), want_u(count);
-            std::vector<double> d(count), want_d(count), z(count), want_z(count);
-            fill_words(engine, stream, first, w);
-            fill_uniforms(engine, stream, first, u);
-            fill_uniforms(engine, stream, first, d);
-            fill_normals(engine, stream, first, z);
-            for (std::size_t i = 0; i < count; ++i) {
-                want_w[i] = word(stream, first + i);
-                want_u[i] = uniform(stream, first + i);
-                want_d[i] = uniform_double(stream, first + i);
-                want_z[i] = normal_double(stream, first + i);
-            }
-            EXPECT_TRUE(same_bits(w, want_w)) << shape.name;
-            EXPECT_TRUE(same_bits(u, want_u)) << shape.name;
-            EXPECT_TRUE(same_bits(d, want_d)) << shape.name;
-            EXPECT_TRUE(same_bits(z, want_z)) << shape.name;
-        }
-    }
+    for (const Shape& shape : some_shapes())
+        for (const std::uint64_t first : {std::uint64_t{0}, (std::uint64_t{1} << 33) - 259, end_of_stream - count})
+            expect_the_hosts_fills(shape, {2, 9}, first, count);
+}
+
+TEST(StreamSmall, every_kernel) {
+    for (const auto generator : {Generator::philox, Generator::pcg4d3x})
+        for (const Shape& shape : smallest_shapes()) expect_the_hosts_fills(shape, {2, 9, generator}, 3, 21);
+}
+
+TEST(Stream, kernels_are_clean_under_oclgrind) {
+    const auto report = under_oclgrind("stream_test", "StreamSmall.*");
+    if (!report) GTEST_SKIP() << "oclgrind is not installed (Debian: apt install oclgrind)";
+    EXPECT_EQ(report->status, 0) << report->output;
+    EXPECT_EQ(report->complaints(), 0) << report->output;
+    EXPECT_NE(report->output.find("[  PASSED  ] 1 test."), std::string::npos) << report->output;
 }
 
 TEST(Stream, fills_views_with_gaps_and_leaves_the_gaps_alone) {

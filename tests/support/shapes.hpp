@@ -46,4 +46,11 @@ inline std::vector<Shape> fewest_shapes() {
             {"ranges, width 16", {.width = 16, .path = Path::ranges}}};
 }
 
+/// Both paths, small enough for oclgrind's interpreter; kept programs would be another driver's.
+inline std::vector<Shape> smallest_shapes() {
+    using Path = EngineOptions::Path;
+    return {{"ranges, width 4", {.width = 4, .path = Path::ranges, .work_items = 2, .disk_cache = false}},
+            {"groups, width 1", {.width = 1, .path = Path::groups, .work_items = 4, .disk_cache = false}}};
+}
+
 }  // namespace clratio::test
