@@ -29,7 +29,9 @@ void carry_metadata(const Image::Metadata& from, Imf::Header& to) {
 fs::path output_target(const fs::path& path) {
     const auto status = fs::status(path);
     if (fs::exists(status) && !fs::is_regular_file(status)) throw std::runtime_error("exists and is not a regular file");
-    return fs::exists(status) ? fs::canonical(path) : path;
+    if (fs::exists(status)) return fs::canonical(path);
+    const bool leads_nowhere = fs::is_symlink(fs::symlink_status(path));
+    return leads_nowhere ? output_target(path.parent_path() / fs::read_symlink(path)) : path;
 }
 
 void require_channels(const Image& image) {
@@ -56,6 +58,7 @@ void require_plausible_size(const Imf::Header& header, std::uint64_t file_bytes)
 void require_exr(const std::string& path) {
     if (const auto status = fs::status(path); !fs::exists(status)) throw std::runtime_error("no such file");
     if (fs::is_directory(path)) throw std::runtime_error("is a folder");
+    if (!fs::is_regular_file(path)) throw std::runtime_error("is not a regular file");
     if (!Imf::isOpenExrFile(path.c_str())) throw std::runtime_error("cannot be opened, or is not an OpenEXR file");
 }
 

@@ -51,6 +51,12 @@ bool lost(int file) {
     return (flock(file, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) || fstat(file, &now) != 0 || now.st_nlink == 0;
 }
 
+/// A file that others may not read stays so.
+void keep_mode(const fs::path& from, int to) {
+    struct stat old {};
+    if (stat(from.c_str(), &old) == 0) (void)!fchmod(to, old.st_mode & 07777);
+}
+
 void sync_folder(const fs::path& folder) {
     const int file = open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (file < 0) throw std::system_error(errno, std::system_category());
@@ -70,6 +76,7 @@ FileOutput::FileOutput(const fs::path& target) : Imf::OStream(target.c_str()), t
         if (file_ < 0) throw std::system_error(errno, std::system_category());
     } while (lost(file_));
     exists_ = true;
+    keep_mode(target, file_);
     lock_ = fcntl(file_, F_DUPFD_CLOEXEC, 0);
 }
 

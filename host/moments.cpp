@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <sstream>
 
 #include "moments_state.hpp"
 
@@ -41,8 +42,10 @@ Group grown(const Group& before, const device::clr_batch& entry, std::uint64_t b
 bool packed(const View& v) { return v.stride == v.channels; }
 
 void check_weight(double weight) {
-    if (!(weight > 0) || weight > 1e30)
-        throw InvalidArgument("weight", "a finite sample count above 0", std::to_string(weight));
+    if (weight >= 0x1p-60 && weight <= 0x1p60) return;
+    std::ostringstream got;
+    got << weight;
+    throw InvalidArgument("weight", "a sample count from 2^-60 to 2^60", got.str());
 }
 
 std::uint64_t count_nonfinite(const Engine& engine, const View& m, const View& t) {

@@ -386,6 +386,21 @@ TEST(Image, a_link_is_followed) {
     write_image(scratch / "link.exr", other);
     EXPECT_TRUE(std::filesystem::is_symlink(scratch / "link.exr"));
     EXPECT_EQ(read_image(scratch / "a.exr").values[0], 7);
+
+    std::filesystem::create_symlink("new.exr", scratch / "leads_nowhere.exr");
+    write_image(scratch / "leads_nowhere.exr", other);
+    EXPECT_TRUE(std::filesystem::is_symlink(scratch / "leads_nowhere.exr"));
+    EXPECT_EQ(read_image(scratch / "new.exr").values[0], 7);
+}
+
+TEST(Image, a_replaced_file_is_as_private_as_it_was) {
+    const clratio::test::Scratch scratch;
+    const std::string file = scratch / "a.exr";
+    write_image(file, small_image());
+    constexpr auto mine = std::filesystem::perms::owner_read | std::filesystem::perms::owner_write;
+    std::filesystem::permissions(file, mine);
+    write_image(file, small_image());
+    EXPECT_EQ(std::filesystem::status(file).permissions(), mine);
 }
 
 namespace {

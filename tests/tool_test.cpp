@@ -2,6 +2,7 @@
 #include <ImfStringAttribute.h>
 #include <gtest/gtest.h>
 #include <png.h>
+#include <sys/stat.h>
 
 #include <cmath>
 #include <limits>
@@ -189,6 +190,15 @@ TEST(Tool, writes_settings_and_metadata) {
     EXPECT_EQ(text("clratio/batches"), "2");
     EXPECT_EQ(text("clratio/tau"), "1 2 3");
     EXPECT_EQ(text("Camera"), "Camera");
+
+    combined(pairs("area", 2) + Words{"--tau", "1", "--weight", "1", "3", "--interval", ".9", "--groups", "2", "-o",
+                                      scratch / "w.exr", "--upper", scratch / "u.exr"});
+    Imf::MultiPartInputFile upper((scratch / "u.exr").c_str());
+    const auto said = [&](const char* name) { return upper.header(0).typedAttribute<Imf::StringAttribute>(name).value(); };
+    EXPECT_EQ(said("clratio/weight"), "1 3");
+    EXPECT_EQ(said("clratio/groups"), "2");
+    EXPECT_EQ(said("clratio/interval"), "0.9");
+    EXPECT_EQ(said("clratio/method"), "fieller");
 }
 
 TEST(Tool, tau_is_a_number_one_a_channel_or_the_mean_of_files) {
@@ -320,6 +330,52 @@ TEST(Tool, usage_errors_exit_2) {
     const Scratch scratch;
     expect_refused(pairs("area", 1) + Words{"--tau", "1", "2", "-o", scratch / "o.exr"}, 2,
                    "2 numbers for the 3 channels of " + files("area", "m", 1)[0]);
+    const Words numbered = pair + Words{"--tau", "1", "-o", "o.exr"};
+    for (const char* weight : {"0", "-1", "nan", "1e-46", "1e38"})
+        expect_refused(numbered + Words{"--weight", weight}, 2, "--weight: expected numbers from 2^-60 to 2^60");
+    expect_refused(numbered + Words{"--first-batch", "-1"}, 2, "--first-batch");
+    expect_refused(numbered + Words{"--needed", "n.exr", "--target", "nan"}, 2, "--target: expected a number above 0");
+}
+
+TEST(Tool, outputs_replace_neither_inputs_nor_each_other_nor_a_state) {
+    const Scratch scratch;
+    const std::string m = scratch / "m.exr", t = scratch / "t.exr", state = scratch / "s.exr", o = scratch / "o.exr";
+    std::filesystem::copy(files("area", "m", 1)[0], m);
+    std::filesystem::copy(files("area", "t", 1)[0], t);
+    const Words batch{"combine", "--m", m, "--t", t, "--tau", "1"};
+    combined(Words{"combine", "--m", m, "--t", t, "--state", state});
+    const std::string old = bytes_of(m), sums = bytes_of(state);
+    expect_refused(batch + Words{"-o", scratch / "./m.exr"}, 2, "an input, and an output");
+    expect_refused(batch + Words{"-o", o, "--flags", t}, 2, "an input, and an output");
+    expect_refused(batch + Words{"-o", o, "--stderr", scratch / "./o.exr"}, 2, "named for two outputs");
+    expect_refused(batch + Words{"-o", state}, 2, "holds a state");
+    expect_refused({"picture", m, "-o", scratch / "./m.exr"}, 2, "an input, and the output");
+    EXPECT_EQ(bytes_of(m), old);
+    EXPECT_EQ(bytes_of(state), sums);
+    EXPECT_EQ(scratch.files(), 3u);
+}
+
+TEST(Tool, a_glob_that_takes_the_reference_for_a_batch_is_refused) {
+    const Words all = Words{"combine", "--m", reference("area", "m")} + files("area", "m", 1) +
+                      Words{"--t", reference("area", "t")} + files("area", "t", 1) + Words{"-o", "o.exr"};
+    expect_refused(all + Words{"--tau", reference("area", "t")}, 2, "a batch of --t, and the --tau");
+    expect_refused(all + Words{"--tau", "1", "--reference", reference("area", "m")}, 2,
+                   "a batch of --m, and the --reference");
+}
+
+TEST(Tool, outputs_go_to_files_alone) {
+    const Scratch scratch;
+    const std::string pipe = scratch / "pipe";
+    ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+    const Words one{files("area", "m", 1)[0]};
+    for (const std::string& place : {pipe, scratch / "."}) {
+        expect_refused(pairs("area", 1) + Words{"--tau", "1", "-o", place}, 1, "exists and is not a regular file");
+        expect_refused(Words{"picture"} + one + Words{"-o", place}, 1, "exists and is not a regular file");
+    }
+    EXPECT_TRUE(std::filesystem::is_fifo(pipe));
+    std::filesystem::create_symlink("real.png", scratch / "link.png");
+    EXPECT_EQ(clratio_tool(Words{"picture"} + one + Words{"-o", scratch / "link.png"}).code, 0);
+    EXPECT_TRUE(std::filesystem::is_regular_file(scratch / "real.png"));
 }
 
 TEST(Tool, errors_exit_1_and_name_the_file) {

@@ -37,7 +37,7 @@ struct CombineOptions {
 struct FlagCounts {
     std::uint64_t zero_denominator = 0, zero_tau = 0, skipped = 0, no_data = 0, no_error_bar = 0, nonfinite = 0,
                   fell_back = 0, no_spread = 0;
-    std::uint64_t any = 0;  ///< values with at least one of those in CombineOptions::counted
+    std::uint64_t any = 0;  ///< values with at least one of those in CombineOptions::counted; stateless: with any at all
     std::uint64_t total() const { return any; }
     FlagCounts& operator+=(const FlagCounts& more);
 };
@@ -56,7 +56,9 @@ struct Combined {
     std::uint64_t negatives = 0;      ///< negative inputs that combine_batches has read
 };
 
-/// tau: one number, one for each of `channels` interleaved channels, or one for each value.
+/// tau: one number, one for each of `channels` interleaved channels, or one for each value. Numbers are copied; an image is
+/// borrowed, and may hold NaN and infinities. Errors, of the call that takes it: InvalidArgument for a number that is not
+/// finite, a count of values that is no multiple of `channels`, an image of another count.
 struct Tau {
     Tau(float number) : numbers{number}, channels(1) {}
     Tau(std::vector<float> each_channel)
@@ -77,21 +79,49 @@ struct CombineOutput {
 };
 
 /// Stateless: one launch, no state, for those who hold their means (or equal-weight sums) already.
-/// Shapes: m, t, out of the same count; tau a View of that count, or one with stride 0. NaN in, NaN out, flagged.
-/// Error: 1.5 ulp of eq. (10). Zero denominator: options.zero. Errors: InvalidArgument before anything is enqueued. Cost: 16
-/// bytes a value. Determinism: the same bits everywhere. Source: supplement eq. (10).
+///
+/// Shapes: m, t, tau and outputs of one count (a tau of stride 0 repeats). An output stands apart from the inputs and other
+/// outputs, or on the very same elements. Units: the estimate's are those of m; tau and t share theirs.
+/// Zero: t = 0 with tau != 0 gives options.zero, tau = 0 gives m / (t + 1); both are flagged.
+/// NaN: one in m, t or tau makes the estimate NaN, flagged, unless t is 0 and what options.zero gives does not use it. For
+/// finite m and tau, an infinite t gives 0, without a flag.
+/// Range: evaluated in float as (tau + i) (m / (t + i)), the quotient first. Within 1.5 ulp of eq. (10) where quotient and
+/// estimate are 0 or in [2^-126, 2^128) in magnitude; infinite or NaN, flagged, where either is above; less exact where
+/// either is below. m = t gives tau exactly, 0 <= m <= t an estimate in [0, tau].
+/// Errors: InvalidArgument (views, estimators other than the ratio, more than estimate and flags) before anything is
+/// enqueued; DeviceError, BuildError. Cost: one pass, 4 bytes a value of each array read or written.
+/// Determinism: the same bits on every device with correctly rounded division, at every width and work size.
+/// Source: supplement eq. (10).
 cl_event combine(const Engine& engine, View m, View t, View tau, const CombineOutput& out, CombineOptions options = {},
                  std::span<const cl_event> wait_list = {});
 Combined combine(const Engine& engine, std::span<const float> m, std::span<const float> t, const Tau& tau,
                  CombineOptions options = {});
 
 /// Reads estimates out of moments: estimator.hpp says what each is, what it needs, and its error bar. Where the mean of t is
-/// 0 or tau is 0, all but the plain mean and the regressions give what the ratio gives.
+/// 0 or tau is 0, all but the two means and the regressions give what the ratio gives.
+///
+/// Shapes: tau and outputs of size() values (a tau of stride 0 repeats). An output stands apart from tau and other outputs,
+/// or on the very same elements. Units: those of m; gain has none, needed counts batches.
+/// NaN: in batches, by NonFinite; a value that all batches were left out of is 0, flagged no_data. A NaN or an infinity in
+/// tau makes the estimate NaN or infinite, flagged, save for estimators that do not use tau there: the plain mean, the ratio
+/// and its relatives where mean(t) is 0 (Zero::mc_mean, Zero::zero), regressions that fall back to the mean, as
+/// crossfit_regression then always does.
+/// Range: each formula as evaluated in float; where a product or quotient named here reaches 2^128 in magnitude, what it
+/// enters is infinite or NaN; below 2^-126 it loses bits, and then is 0.
+/// - ratio: mean(m) / mean(t), then times tau: no square, so every m, t and tau whose two results fit.
+/// - error bars, intervals, gain, bias and the other estimators' corrections: weight times squares and products of
+///   deviations of m and t, and 1 / mean(t), tau / mean(t). A NaN error bar has no flag; one of 0 has, with an interval,
+///   no_spread, also where squares vanished.
+/// - beale besides: tau times the covariance of t and the residual, over mean(t)^2 + Var(mean(t)): that is third powers,
+///   so all magnitudes within about 2^-42 to 2^42. NaN where all |t| are below 2^-75, as the divisor is 0 then.
+///
 /// Confidence intervals: IntervalMethod::delta is estimate -+ q error, fieller is exact for normal means and belongs to the
 /// ratio whatever the estimator; q is Student's quantile at K - 1 degrees of freedom (regressions: K - 2), where K counts
 /// the value's own batches up to 1024 and the state's beyond. Errors: InvalidArgument for an estimator whose planes the
-/// state lacks (it says what to record), level, targets, views. Determinism: the same bits at every width and work size.
-/// Cost: one pass over the planes read (state_bytes()) and written.
+/// state lacks (it says what to record), level, targets, tau, views, before anything is enqueued; DeviceError, BuildError.
+/// Determinism: the same bits on every device with correctly rounded + - * / sqrt and fma, at every width and work size.
+/// Cost: one pass over the planes read (state_bytes() at most) and what is written, up to three over those of groups.
+/// Source: supplement eq. (10), eq. (5) for the mean of ratios; estimator.hpp for all others; Fieller 1940.
 cl_event combine(const Moments& moments, View tau, const CombineOutput& out, CombineOptions options = {},
                  std::span<const cl_event> wait_list = {});
 /// The memory of `reuse`, an earlier result, is taken for this one.
@@ -99,9 +129,16 @@ Combined combine(const Moments& moments, const Tau& tau, CombineOptions options 
 
 /// Adds batches and reads out; ratio, mean and mean of ratios of a state without groups in the pass that adds the last 8
 /// batches, if nothing but estimate, error and flags is asked for. For progressive display, and where all batches are there.
+///
+/// Shapes: every batch, tau and output of moments.size() values. Units, NaN, zero, range: those of Moments::add and of
+/// combine(Moments). Errors: theirs too, and InvalidArgument for no batch at all; all found before the state changes. After
+/// a DeviceError or a BuildError the state may hold some of the batches.
+/// Cost: 8 bytes a value and batch, the state read and written once for each 8 batches of a group, and what is written;
+/// where the pass is not shared, a read-out besides. Determinism: the bits of Moments::add, then combine(Moments).
 Combined add_and_combine(Moments& moments, std::span<const HostBatch> batches, const Tau& tau, CombineOptions options = {},
                          Combined reuse = {});
-/// At most 8 batches.
+/// 1 to 8 batches; enqueues and returns, the caller releases the event. All as above, but that NonFinite::fail is refused.
+/// An output must not overlap the views of the batches, which is not checked.
 cl_event add_and_combine(Moments& moments, std::span<const Batch> batches, View tau, const CombineOutput& out,
                          CombineOptions options = {}, std::span<const cl_event> wait_list = {});
 

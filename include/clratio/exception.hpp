@@ -6,6 +6,7 @@
 
 namespace clratio {
 
+/// The base of all exceptions of the library; what() is the whole message. std::bad_alloc may come besides.
 class Error : public std::runtime_error {
 public:
     using std::runtime_error::runtime_error;

@@ -66,9 +66,10 @@ struct StatePlanes {
 ///
 /// Shapes: every batch has size() values. Units: those of m and t.
 /// NaN and infinity: by NonFinite. Zero t: accepted. Negative values: accepted, counted by negatives().
-/// Weights: finite and positive, else InvalidArgument; the sum is exact for integers below 2^48.
-/// Determinism: the same batches in the same order give the same bits at every width and work size, and however
-/// many are added in one call; another grouping, merged, agrees within 2 ulp of the estimate.
+/// Weights: from 2^-60 to 2^60, else InvalidArgument; the sum is exact for integers below 2^48.
+/// Determinism: the same batches in the same order give the same bits at every width and work size, and however many are
+/// added in one call, on every device with correctly rounded + - * / and fma; another grouping, merged, agrees within 2 ulp
+/// of the estimate.
 /// Cost: state_bytes() on the device (40 bytes a value, 52 with skip; times groups); 8 batches a launch, or the batches of
 /// one group, which reads and writes the state of the group once. Not for concurrent use of one object; several objects may
 /// share an Engine across threads.
@@ -88,10 +89,15 @@ public:
     /// Blocking. Spans of size() floats on the host.
     void add(std::span<const float> m, std::span<const float> t, double weight = 1);
     void add(std::span<const HostBatch> batches);
-    /// Event form: enqueues and returns; the caller releases the event. NonFinite::fail is not possible here.
+    /// Event form: enqueues and returns; the caller releases the event. Errors: InvalidArgument before anything is enqueued:
+    /// no batch, NonFinite::fail, a weight out of range, a view that is null, without channels, of another count than size()
+    /// or past its buffer's end, more than 2^32 - 1 batches in the state. DeviceError, BuildError: the state may then hold
+    /// some of the batches.
     cl_event add(std::span<const Batch> batches, std::span<const cl_event> wait_list);
 
-    /// Chan's merge: as if other's batches had been added after these. Errors: another size, options or Engine.
+    /// Chan's merge: as if other's batches had been added after these. Errors: InvalidArgument for another size, options or
+    /// Engine, more than 2^32 - 1 batches together. Cost: reads both states and writes this one, 3 state_bytes() at most, in
+    /// a launch for the first group and for each other one in which `other` has batches.
     void merge(const Moments& other);
     cl_event merge(const Moments& other, std::span<const cl_event> wait_list);
 

@@ -48,6 +48,7 @@ struct Snapshot {
 MomentsOptions moments_options(const Snapshot& snapshot);
 
 /// Values [begin, begin + count) of a snapshot, with none of its negatives and skipped: a state of its own.
+/// Errors: InvalidArgument for a range past the end. Each plane must hold `values` words, which is not checked.
 Snapshot slice(const Snapshot& snapshot, std::uint64_t begin, std::uint64_t count);
 /// The reverse: more values after those that are there, their negatives and skipped added. An empty one takes all of `more`.
 /// Errors: InvalidArgument where kind, settings, groups or planes differ.

@@ -36,10 +36,12 @@ int combine_without_state(const Options& options) {
         run.read_out_at_once(pairs);
         return run.report(reader.seconds());
     }
+    const Interrupt interrupt;
     ProgressLine line;
     for (;; pairs = reader.next()) {
         run.add(pairs);
         if (reader.done()) break;
+        if (interrupt.asked()) throw Stopped(run.how_to_go_on());
         line.show(fmt::format("{} of {} batches", run.batches(), options.m.size()));
     }
     run.read_out();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "clratio/state.hpp"
 #include "command.hpp"
 #include "output_file.hpp"
 
@@ -19,7 +20,7 @@ Estimators (docs/estimators.md says which one when):
   tin             much like beale, but can leave [0, tau]
   jackknife       the ratio with less bias, from --groups of batches; noisy with few
   mickey          unbiased, from --groups of batches
-  hartley-ross    unbiased, from the ratios of single batches; suffers where t is small
+  hartley-ross    unbiased where all weights are equal, from the ratios of single batches; suffers where t is small
   regression      mean(m) - beta (mean(t) - tau); the least noise where there are many batches
   crossfit-regression  the same, unbiased, with the slopes of the other --groups
   mean            mean(m), for comparison; tau and t are not used
@@ -42,8 +43,8 @@ layer in one file, --layer one for all; with one colour layer in the file it is 
 from the first file of --m. The output is float, ZIP, with the windows and attributes of that file and the settings used.
 --flags: a UINT for each value; 1 mean t is 0, 2 tau is 0, 4 batch skipped, 8 no data, 16 no error bar, 32 not finite,
 64 too few batches for the estimator, 128 the batches agree exactly and the interval has no width.
---stderr: the standard error by the delta method (jackknife: its own); +inf with one batch. Without it a missing error bar
-is no flag that --fail-on-flag looks at.
+--stderr: the standard error by the delta method (jackknife: its own); +inf with one batch (a regression: two). Without it
+a missing error bar is no flag that --fail-on-flag looks at. hartley-ross and mean-of-ratios: 1 where t of some batch is 0.
 
 --interval LEVEL: a confidence interval of each value, --lower to --upper. --method fieller (default) belongs to the ratio
 and need not be bounded; --kind, a UINT, says what the two numbers mean: 0 between them, 1 all but what lies between them,
@@ -70,7 +71,8 @@ that have one, in units of m), or on Ctrl-C.
 
 --json prints batches, pixels, channels, estimator, device, output, flags (how many values carry each; any: at least one),
 negative_inputs, seconds (decode, summed over the reading threads; device; encode), with --state also state (file, ranges,
-held: batches it began with, added: batches since) and with --reference rmse, bias, rmse_mean and bias_mean (of the plain
+held: batches it began with, added: batches since), with --interval interval (level, method, bounded, of them points,
+exclusive, whole_line, coverage, coverage_with_width) and with --reference rmse, bias, rmse_mean and bias_mean (of the plain
 mean), over the values that are finite in both files.
 
 Exit codes: 0 done, 1 failed, 2 usage, 3 done but values were flagged and --fail-on-flag was given, 130 stopped.
@@ -78,7 +80,7 @@ Exit codes: 0 done, 1 failed, 2 usage, 3 done but values were flagged and --fail
 Examples:
   clratio combine --m m_*.exr --t t_*.exr --tau tau.exr -o out.exr
   clratio combine --m a_m.exr b_m.exr --t a_t.exr b_t.exr --tau 1 -o out.exr --layer ViewLayer.Combined
-  clratio combine --m m_*.exr --t t_*.exr --tau t_ref.exr -o out.exr --reference m_ref.exr --stderr error.exr --json
+  clratio combine --m m_0*.exr --t t_0*.exr --tau t_ref.exr -o out.exr --reference m_ref.exr --stderr error.exr --json
   clratio combine --m m_*.exr --t t_*.exr --tau tau.exr -o out.exr --state sums.exr --resume
   clratio combine --watch renders --m "m_*.exr" --t "t_*.exr" --tau tau.exr -o out.exr --state sums.exr --resume)";
 
@@ -107,12 +109,49 @@ void require_counts(const Options& options) {
                                      options.m.size(), options.t.size()));
 }
 
+/// The files of inputs, without :LAYER.
+std::vector<std::string> inputs(const Options& options) {
+    std::vector<std::string> files{options.reference};
+    for (const auto* list : {&options.m, &options.t, &options.tau})
+        if (options.watch.empty() || list == &options.tau) files.insert(files.end(), list->begin(), list->end());
+    for (auto& file : files)
+        if (const auto colon = file.rfind(':'); colon != std::string::npos && !std::filesystem::exists(file))
+            file.resize(colon);
+    return files;
+}
+
+bool is_state(const std::string& file) {
+    try {
+        clratio::inspect_state(file);
+        return true;
+    } catch (const clratio::Error&) {
+        return false;
+    }
+}
+
+bool is_named_in(const std::vector<std::string>& files, const std::string& file) {
+    return std::any_of(files.begin(), files.end(), [&](const auto& f) { return is_same_file(f, file); });
+}
+
 void require_different(const Options& options) {
     std::vector<std::string> files;
+    const auto read = inputs(options);
     for (const auto& file : outputs(options)) {
-        if (std::find(files.begin(), files.end(), file) != files.end()) throw UsageError(file + ": named for two outputs");
+        if (is_named_in(files, file)) throw UsageError(file + ": named for two outputs");
+        if (is_named_in(read, file)) throw UsageError(file + ": an input, and an output");
+        if (file != options.state && is_state(file))
+            throw UsageError(file + ": holds a state, which an image would replace; remove it first");
         files.push_back(file);
     }
+}
+
+/// A glob takes more than the batches where their names do not tell them from the others.
+void require_inputs_apart(const Options& options) {
+    if (options.m.size() < 2) return;
+    if (!options.reference.empty() && is_named_in(options.m, options.reference))
+        throw UsageError(options.reference + ": a batch of --m, and the --reference");
+    for (const auto& file : options.tau)
+        if (is_named_in(options.t, file)) throw UsageError(file + ": a batch of --t, and the --tau");
 }
 
 void require_error_bar(const Options& options) {
@@ -123,6 +162,10 @@ void require_error_bar(const Options& options) {
         throw UsageError("--lower, --upper and --kind need --interval LEVEL, as in --interval .95");
     if (options.interval && !(*options.interval > 0 && *options.interval < 1))
         throw UsageError(fmt::format("--interval: expected a level between 0 and 1, got {}", *options.interval));
+    for (const auto& [name, target] :
+         {std::pair{"--target", options.target}, {"--relative-target", options.relative_target}})
+        if (!(target >= 0) || !std::isfinite(target))
+            throw UsageError(fmt::format("{}: expected a number above 0, got {}", name, target));
     if (options.needed.empty() != (options.target <= 0 && options.relative_target <= 0))
         throw UsageError("--needed goes with --target or --relative-target");
 }
@@ -135,11 +178,14 @@ void require_groups(const Options& options) {
 }
 
 void require_weights(const Options& options) {
+    if (!options.watch.empty() && options.weight.size() > 1)
+        throw UsageError("--weight: with --watch all batches have one weight");
     if (options.weight.size() > 1 && options.weight.size() != options.m.size())
         throw UsageError(fmt::format("--weight: expected one number, or one for each of the {} batches, got {}",
                                      options.m.size(), options.weight.size()));
     for (const double w : options.weight)
-        if (!(w > 0) || !std::isfinite(w)) throw UsageError(fmt::format("--weight: expected numbers above 0, got {}", w));
+        if (!(w >= 0x1p-60 && w <= 0x1p60))
+            throw UsageError(fmt::format("--weight: expected numbers from 2^-60 to 2^60, got {}", w));
 }
 
 void require_enough(const Options& options) {
@@ -252,7 +298,10 @@ void add_options(Command& command, const std::shared_ptr<Options>& o) {
     command.option("--state", o->state, "Keep the sums in this file, which later runs and machines can go on with")
         .type("STATE.exr");
     command.flag("--resume", o->resume, "Go on with --state; listed batches that it holds are skipped");
-    command.option("--first-batch", o->first_batch, "The index of the first listed batch").type("N").shows_default();
+    command.option("--first-batch", o->first_batch, "The index of the first listed batch")
+        .type("N")
+        .within(0, std::uint64_t{1} << 62)
+        .shows_default();
     command.option("--checkpoint", o->checkpoint, "Save the state every so many seconds; 0: after each launch")
         .type("SECONDS")
         .not_negative()
@@ -278,12 +327,13 @@ void check(const Options& options) {
     require_enough(options);
     require_counts(options);
     require_different(options);
+    require_inputs_apart(options);
     require_error_bar(options);
     require_groups(options);
     require_weights(options);
     require_state(options);
     require_watch(options);
-    for (const auto& file : outputs(options)) require_folder_of(file);
+    for (const auto& file : outputs(options)) require_place_for(file);
 }
 
 }  // namespace tool::combining

@@ -51,12 +51,14 @@ void print_flags(const Options& options, const Report& r) {
     const auto line = [](std::uint64_t count, const char* what) {
         if (count != 0) fmt::print("  {:>10}  {}\n", count, what);
     };
-    line(r.flags.zero_denominator, "mean t is 0: the zero policy gave the value");
+    line(r.flags.zero_denominator, clratio::needs_of(options.chosen()).ratios
+                                       ? "t of some batch is 0"
+                                       : "mean t is 0: the zero policy gave the value");
     line(r.flags.zero_tau, "tau is 0: the impulse guard gave the value");
     line(r.flags.skipped, "a batch was not finite and left out");
     line(r.flags.no_data, "no finite batch: the value is 0");
     line(options.standard_error.empty() ? 0 : r.flags.no_error_bar,
-         "no error bar: fewer than two batches, or a constant by the zero policy");
+         "no error bar: fewer than two batches (a regression: three), or a constant by the zero policy");
     line(r.flags.nonfinite, "the estimate is not finite");
     line(r.flags.fell_back, "too few batches or groups for the estimator: the ratio or the mean stands there");
     line(r.negatives, "negative inputs (counted only)");
@@ -73,9 +75,12 @@ void print_text(const Options& options, const Report& r) {
     print_flags(options, r);
     if (r.intervals) {
         const auto& [bounded, exclusive, whole] = r.intervals->kinds;
-        fmt::print("{} intervals of level {}: {} bounded ({} of them points: all batches agree), {} exclusive, {} the whole "
-                   "line\n",
-                   options.method, *options.interval, bounded, r.intervals->points, exclusive, whole);
+        const bool of_ratio = options.method == "fieller" && options.estimator != "ratio";
+        fmt::print(
+            "{} intervals{} of level {}: {} bounded ({} of them points: all batches agree), {} exclusive, {} the whole "
+            "line\n",
+            options.method, of_ratio ? " of the ratio" : "", *options.interval, bounded, r.intervals->points, exclusive,
+            whole);
         if (r.intervals->coverage)
             fmt::print("  {:.2f} % of the reference lies in them, {:.2f} % in those that are no points\n",
                        100 * *r.intervals->coverage, 100 * *r.intervals->coverage_with_width);

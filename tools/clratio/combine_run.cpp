@@ -18,22 +18,33 @@ template <class Work> auto timed(double& seconds, Work work) {
     return work();
 }
 
-clratio::WriteOptions settings(const Options& options, const Report& report) {
-    std::string tau = options.tau.front();
-    for (std::size_t i = 1; i < options.tau.size(); ++i) tau += " " + options.tau[i];
-    return {{{"clratio/version", CLRATIO_VERSION},
-             {"clratio/estimator", options.estimator},
-             {"clratio/zero", options.zero},
-             {"clratio/nonfinite", report.nonfinite},
-             {"clratio/batches", std::to_string(report.batches)},
-             {"clratio/ranges", report.ranges},
-             {"clratio/tau", tau},
-             {"clratio/device", report.device}}};
+template <class Words, class Value> std::string name_of(const Words& words, Value value) {
+    return std::find_if(words.begin(), words.end(), [&](const auto& word) { return word.second == value; })->first;
 }
 
-std::string name_of(NonFinite value) {
-    const auto same = [&](const auto& entry) { return entry.second == value; };
-    return std::find_if(nonfinites.begin(), nonfinites.end(), same)->first;
+clratio::WriteOptions settings(const Options& options, const clratio::MomentsOptions& moments, const Report& report) {
+    clratio::WriteOptions all{{{"clratio/version", CLRATIO_VERSION},
+                               {"clratio/estimator", options.estimator},
+                               {"clratio/zero", options.zero},
+                               {"clratio/nonfinite", report.nonfinite},
+                               {"clratio/batches", std::to_string(report.batches)},
+                               {"clratio/ranges", report.ranges},
+                               {"clratio/tau", fmt::format("{}", fmt::join(options.tau, " "))},
+                               {"clratio/device", report.device}}};
+    const auto tell = [&](const char* name, const std::string& value) {
+        all.attributes.emplace_back(std::string("clratio/") + name, value);
+    };
+    if (moments.groups > 1) tell("groups", std::to_string(moments.groups));
+    if (!options.weight.empty()) tell("weight", fmt::format("{}", fmt::join(options.weight, " ")));
+    if (moments.weights != clratio::Weights::samples) tell("weights", name_of(weightings, moments.weights));
+    if (options.interval) {
+        tell("interval", fmt::format("{}", *options.interval));
+        tell("method", options.method);
+    }
+    if (options.target > 0) tell("target", fmt::format("{}", options.target));
+    if (options.relative_target > 0) tell("relative-target", fmt::format("{}", options.relative_target));
+    if (!options.layer.empty()) tell("layer", options.layer);
+    return all;
 }
 
 double root_mean_square(const std::vector<float>& errors) {
@@ -53,7 +64,7 @@ Intervals summary(const clratio::CombinedImage& out, const clratio::Image& refer
     std::uint64_t covered = 0, covered_points = 0;
     for (std::size_t i = 0; i < out.kind.size(); ++i) {
         const float lower = out.lower.values[i], upper = out.upper.values[i];
-        const bool point = lower == upper;
+        const bool point = lower == upper && out.kind[i] == CLR_KIND_BOUNDED;
         ++sum.kinds.at(out.kind[i]);
         sum.points += point;
         if (reference.values.empty()) continue;
@@ -85,7 +96,7 @@ CombineRun::CombineRun(const Options& options)
         moments_ = clratio::moments_options(*sums);
         bands_.emplace(engine_, *sums, keeper_.shape().channels.size());
     }
-    report_.nonfinite = name_of(moments_.nonfinite);
+    report_.nonfinite = name_of(nonfinites, moments_.nonfinite);
     if (bands_) fit_tau();
 }
 
@@ -155,7 +166,7 @@ void CombineRun::write(ReadOut&& read_out) {
         report_.scores = {difference(out.estimate, reference_), difference(mean.estimate, reference_)};
     }
     timed(report_.seconds.encode, [&] {
-        const auto with = settings(options_, report_);
+        const auto with = settings(options_, moments_, report_);
         clratio::write_image(options_.output, out.estimate, with);
         const auto image = [&](const std::string& file, const clratio::Image& values) {
             if (!file.empty()) clratio::write_image(file, values, with);

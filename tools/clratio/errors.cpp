@@ -38,11 +38,11 @@ Plan plan_of(const Options& o) {
 }
 
 void require_outputs(const Options& o) {
-    if (!o.csv.empty() && o.csv == o.plot) throw UsageError(o.csv + ": named for two outputs");
-    require_folder_of(o.csv);
+    if (!o.csv.empty() && is_same_file(o.csv, o.plot)) throw UsageError(o.csv + ": named for two outputs");
+    require_place_for(o.csv);
     if (o.plot.empty()) return;
     require_picture_name(o.plot);
-    require_folder_of(o.plot);
+    require_place_for(o.plot);
     require_gnuplot(o.plot);
 }
 

@@ -9,9 +9,27 @@
 #include "clratio/exception.hpp"
 
 namespace tool {
+namespace {
+
+namespace fs = std::filesystem;
+
+[[noreturn]] void cannot_write(const std::string& file, const std::string& reason) {
+    throw clratio::IoError(file, "", "cannot be written: " + reason);
+}
+
+fs::path followed(const fs::path& file) {
+    return fs::is_symlink(fs::symlink_status(file)) ? followed(file.parent_path() / fs::read_symlink(file)) : file;
+}
+
+std::string target_of(const std::string& file) {
+    require_place_for(file);
+    return followed(file).string();
+}
+
+}  // namespace
 
 OutputFile::OutputFile(std::string path)
-    : path_(std::move(path)), part_(path_ + "." + std::to_string(getpid()) + ".part"),
+    : path_(std::move(path)), target_(target_of(path_)), part_(target_ + "." + std::to_string(getpid()) + ".part"),
       file_(std::fopen(part_.c_str(), "wb")) {
     if (!file_) fail();
 }
@@ -20,9 +38,7 @@ OutputFile::~OutputFile() {
     if (file_) std::remove(part_.c_str());
 }
 
-void OutputFile::fail() const {
-    throw clratio::IoError(path_, "", std::string("cannot be written: ") + std::strerror(errno));
-}
+void OutputFile::fail() const { cannot_write(path_, std::strerror(errno)); }
 
 void OutputFile::write(std::string_view bytes) {
     if (std::fwrite(bytes.data(), 1, bytes.size(), file_.get()) != bytes.size()) fail();
@@ -30,14 +46,22 @@ void OutputFile::write(std::string_view bytes) {
 
 void OutputFile::commit() {
     if (std::fflush(file_.get()) != 0 || fsync(fileno(file_.get())) != 0) fail();
-    if (std::rename(part_.c_str(), path_.c_str()) != 0) fail();
+    if (std::rename(part_.c_str(), target_.c_str()) != 0) fail();
     file_.reset();
 }
 
-void require_folder_of(const std::string& file) {
-    const auto folder = std::filesystem::path(file).parent_path();
-    if (!folder.empty() && !std::filesystem::is_directory(folder))
-        throw clratio::IoError(file, "", "cannot be written: no folder " + folder.string());
+void require_place_for(const std::string& file) {
+    const auto folder = fs::path(file).parent_path();
+    if (!folder.empty() && !fs::is_directory(folder)) cannot_write(file, "no folder " + folder.string());
+    std::error_code none;
+    const auto there = fs::status(file, none);
+    if (fs::exists(there) && !fs::is_regular_file(there)) cannot_write(file, "exists and is not a regular file");
+}
+
+bool is_same_file(const std::string& a, const std::string& b) {
+    if (a.empty() || b.empty()) return false;
+    std::error_code none;
+    return fs::weakly_canonical(fs::absolute(a), none) == fs::weakly_canonical(fs::absolute(b), none);
 }
 
 }  // namespace tool

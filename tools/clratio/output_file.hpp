@@ -8,8 +8,8 @@
 
 namespace tool {
 
-/// Written beside `path` under another name, which commit() gives up for `path`; without it nothing is left. Every failure
-/// is a clratio::IoError that names `path`.
+/// Written beside `path` under another name, which commit() gives up for `path`; without it nothing is left. A symbolic link
+/// is followed. Every failure is a clratio::IoError that names `path`.
 class OutputFile {
 public:
     explicit OutputFile(std::string path);
@@ -26,11 +26,15 @@ private:
     };
     [[noreturn]] void fail() const;
 
-    std::string path_, part_;
+    std::string path_, target_, part_;
     std::unique_ptr<std::FILE, Close> file_;
 };
 
-/// A folder that is not there is said before the work, not after it: IoError. An empty name is none.
-void require_folder_of(const std::string& file);
+/// Said before the work, not after it, as an IoError: that `file` has no folder, or that what stands there is no file. An
+/// empty name is none.
+void require_place_for(const std::string& file);
+
+/// Whether both names lead to one file, whether it exists or not.
+bool is_same_file(const std::string& a, const std::string& b);
 
 }  // namespace tool

@@ -53,8 +53,10 @@ Canvas draw(const std::vector<clratio::Image>& images, const Options& options) {
 int picture(const Options& options) {
     if (!options.titles.empty() && options.titles.size() != options.images.size())
         throw UsageError(fmt::format("--titles has {} titles for {} images", options.titles.size(), options.images.size()));
+    require_place_for(options.output);
     std::vector<clratio::Image> images;
     for (const auto& file : options.images) {
+        if (is_same_file(file, options.output)) throw UsageError(options.output + ": an input, and the output");
         images.push_back(clratio::read_image(file, options.layer));
         require_colour(images.back());
         clratio::require_same_shape(images.front(), images.back());
@@ -63,7 +65,8 @@ int picture(const Options& options) {
     OutputFile out(options.output);
     out.write(png_of(canvas, options.output));
     out.commit();
-    fmt::print("{}: {} images, {}x{} pixels\n", options.output, images.size(), canvas.width(), canvas.height());
+    fmt::print("{}: {} image{}, {}x{} pixels\n", options.output, images.size(), images.size() == 1 ? "" : "s",
+               canvas.width(), canvas.height());
     return ok;
 }
 
