@@ -80,8 +80,9 @@ std::vector<HostBatch> slices(std::span<const HostBatch> batches, std::uint64_t 
 
 /// As many as one allocation holds; whole pixels.
 std::uint64_t values_in_a_part(const Engine& engine, const Tau& tau) {
-    const std::uint64_t most = std::max<std::uint64_t>(engine.info().largest_allocation / sizeof(float), tau.channels);
-    return most / tau.channels * tau.channels;
+    const std::uint64_t channels = std::max<std::uint64_t>(1, tau.channels);
+    const std::uint64_t most = std::max<std::uint64_t>(engine.info().largest_allocation / sizeof(float), channels);
+    return most / channels * channels;
 }
 
 /// A result of `count` values, with what the options ask for; its memory is that of `reuse`.
@@ -241,7 +242,8 @@ void check_estimator(const CombineOptions& options, const MomentsOptions& state)
         throw InvalidArgument("standard_error", "an estimator that has one", "mean-of-ratios, which has none");
     if (!(options.level > 0 && options.level < 1))
         throw InvalidArgument("level", "a number in (0, 1)", std::to_string(options.level));
-    if (!(options.target >= 0) || !(options.relative_target >= 0))
+    const auto is_target = [](float x) { return x >= 0 && std::isfinite(x); };
+    if (!is_target(options.target) || !is_target(options.relative_target))
         throw InvalidArgument("target", "a finite number of at least 0",
                               std::to_string(options.target) + " and relative " + std::to_string(options.relative_target));
 }

@@ -416,6 +416,12 @@ TEST(Combine, misuse_is_refused_by_name) {
     refused([&] { combine(engine, all, all, all, {all, {}, nullptr}, {.estimator = Estimator::mean}); }, "estimator");
     const std::vector<float> three(3), two(2);
     refused([&] { combine(engine, three, two, 1.0f); }, "t: expected 3 values, got 2");
+    refused(
+        [&] {
+            combine_batches(engine, std::vector<HostBatch>{{three, three}}, Tau(std::vector<float>{}));
+        },
+        "tau: expected 3");
+    EXPECT_TRUE(combine_batches(engine, std::vector<HostBatch>{{{}, {}}}, Tau(std::vector<float>{})).estimate.empty());
     const Moments s(engine, 100);
     refused([&] { combine(s, 1.0f, {.estimator = Estimator::mean_of_ratios}); }, ".ratios = true");
 }
