@@ -321,6 +321,17 @@ TEST(StateTool, stopped_politely_it_saves_and_says_how_to_go_on) {
     EXPECT_EQ(verdict(state, batches, 120), "");
 }
 
+TEST(StateTool, an_image_that_does_not_fit_loses_none_before_it) {
+    const Scratch scratch;
+    const Batches batches(2);
+    const std::string state = scratch / "s.exr", large = CLRATIO_TEST_DATA "/cycles/area/m_000.exr";
+    const Words job{
+        "combine", "--m", batches.m_file(0), batches.m_file(1), large, "--t", batches.t_file(0), batches.t_file(1), large,
+        "--state", state};
+    expect_refused(job, 1, large);
+    EXPECT_EQ(inspect_state(state).ranges.text(), "[0,2)");
+}
+
 TEST(StateTool, a_full_disk_exits_1_and_keeps_the_old_state) {
     const Scratch scratch;
     const Batches batches(3);

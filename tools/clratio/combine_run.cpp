@@ -106,36 +106,49 @@ void CombineRun::fit_tau() {
     if (!reference_file_.done()) reference_ = reference_file_.next_like(keeper_.shape());
 }
 
-std::vector<clratio::HostBatch> CombineRun::accept(const std::vector<Pair>& pairs) {
-    std::vector<clratio::HostBatch> batches;
-    for (const Pair& pair : pairs) {
-        const bool first = keeper_.shape().channels.empty();
-        keeper_.fit(pair);
-        if (first) fit_tau();
-        if (moments_.nonfinite == NonFinite::fail) {
-            require_finite(pair.m);
-            require_finite(pair.t);
+void CombineRun::require_fit(const Pair& pair) {
+    const bool first = keeper_.shape().channels.empty();
+    keeper_.fit(pair);
+    if (first) fit_tau();
+    if (moments_.nonfinite != NonFinite::fail) return;
+    require_finite(pair.m);
+    require_finite(pair.t);
+}
+
+CombineRun::Accepted CombineRun::accept(const std::vector<Pair>& pairs) {
+    Accepted accepted;
+    try {
+        for (const Pair& pair : pairs) {
+            require_fit(pair);
+            accepted.batches.push_back({pair.m, pair.t, options_.weight_of(pair.index), pair.index});
         }
-        batches.push_back({pair.m, pair.t, options_.weight_of(pair.index), pair.index});
+    } catch (...) {
+        accepted.misfit = std::current_exception();
     }
-    return batches;
+    return accepted;
 }
 
 void CombineRun::add(const std::vector<Pair>& pairs) {
-    const auto batches = accept(pairs);
-    if (!bands_) bands_.emplace(engine_, pairs.front().m.size(), keeper_.shape().channels.size(), moments_);
-    whole_ = false;
-    timed(report_.seconds.device, [&] { bands_->add(batches); });
-    whole_ = true;
-    for (const Pair& pair : pairs) keeper_.added(pair);
-    if (keeper_.due()) save();
+    const Accepted accepted = accept(pairs);
+    const auto& batches = accepted.batches;
+    if (!batches.empty()) {
+        if (!bands_) bands_.emplace(engine_, pairs.front().m.size(), keeper_.shape().channels.size(), moments_);
+        whole_ = false;
+        timed(report_.seconds.device, [&] { bands_->add(batches); });
+        whole_ = true;
+        for (std::size_t k = 0; k < batches.size(); ++k) keeper_.added(pairs[k]);
+        if (keeper_.due()) save();
+    }
+    if (accepted.misfit) std::rethrow_exception(accepted.misfit);
 }
 
 void CombineRun::read_out_at_once(const std::vector<Pair>& pairs) {
-    const auto batches = accept(pairs);
+    const Accepted accepted = accept(pairs);
+    if (accepted.misfit) std::rethrow_exception(accepted.misfit);
     for (const Pair& pair : pairs) keeper_.added(pair);
     const clratio::BatchOptions how{moments_.nonfinite, moments_.weights};
-    write(timed(report_.seconds.device, [&] { return read_at_once(engine_, batches, tau_, options_.wanted(), how); }));
+    write(timed(report_.seconds.device,
+                [&] { return read_at_once(engine_, accepted.batches, tau_, options_.wanted(), how); }));
 }
 
 void CombineRun::save() {

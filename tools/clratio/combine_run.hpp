@@ -43,7 +43,13 @@ public:
 
 private:
     void fit_tau();
-    std::vector<clratio::HostBatch> accept(const std::vector<Pair>& pairs);
+    /// Those before the first that does not fit, and why it does not.
+    struct Accepted {
+        std::vector<clratio::HostBatch> batches;
+        std::exception_ptr misfit;
+    };
+    void require_fit(const Pair& pair);
+    Accepted accept(const std::vector<Pair>& pairs);
     void write(ReadOut&& read_out);
 
     const Options& options_;
