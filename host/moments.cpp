@@ -42,7 +42,7 @@ Group grown(const Group& before, const device::clr_batch& entry, std::uint64_t b
 bool packed(const View& v) { return v.stride == v.channels; }
 
 void check_weight(double weight) {
-    if (weight >= 0x1p-60 && weight <= 0x1p60) return;
+    if (weight >= least_weight && weight <= most_weight) return;
     std::ostringstream got;
     got << weight;
     throw InvalidArgument("weight", "a sample count from 2^-60 to 2^60", got.str());

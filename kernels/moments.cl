@@ -4,8 +4,6 @@
 
 #define CLR_EACH_BATCH(X) X(0) X(1) X(2) X(3) X(4) X(5) X(6) X(7)
 #define CLR_BATCH_ARGUMENTS(k) global const float *m##k, global const float *t##k,
-#define CLR_M(k) m##k,
-#define CLR_T(k) t##k,
 
 CLR_FN clr_uint clr_one_where(clr_mask m) { return m ? (clr_uint)(1u) : (clr_uint)(0u); }
 

@@ -121,13 +121,7 @@ TEST(ErrorSmall, every_kernel) {
             expect_the_hosts_samples(Engine(shape.options), laws()[1], {2, 0, generator}, 21);
 }
 
-TEST(Error, kernels_are_clean_under_oclgrind) {
-    const auto report = under_oclgrind("error_test", "ErrorSmall.*");
-    if (!report) GTEST_SKIP() << "oclgrind is not installed (Debian: apt install oclgrind)";
-    EXPECT_EQ(report->status, 0) << report->output;
-    EXPECT_EQ(report->complaints(), 0) << report->output;
-    EXPECT_NE(report->output.find("[  PASSED  ] 1 test."), std::string::npos) << report->output;
-}
+TEST(Error, kernels_are_clean_under_oclgrind) { expect_clean_under_oclgrind("error_test", "ErrorSmall.*"); }
 
 TEST(Error, a_range_is_its_parts) {
     const Engine engine;

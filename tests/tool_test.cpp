@@ -376,6 +376,8 @@ TEST(Tool, outputs_go_to_files_alone) {
     std::filesystem::create_symlink("real.png", scratch / "link.png");
     EXPECT_EQ(clratio_tool(Words{"picture"} + one + Words{"-o", scratch / "link.png"}).code, 0);
     EXPECT_TRUE(std::filesystem::is_regular_file(scratch / "real.png"));
+    std::filesystem::create_symlink("loop.png", scratch / "loop.png");
+    expect_refused(Words{"picture"} + one + Words{"-o", scratch / "loop.png"}, 1, "cannot be written");
 }
 
 TEST(Tool, errors_exit_1_and_name_the_file) {

@@ -20,6 +20,9 @@ enum class NonFinite {
     fail,       ///< the whole batch is refused with InvalidArgument, the state stays as it was (blocking calls only)
 };
 
+/// The range of a batch's weight: squares of weights and sums of them stay floats.
+inline constexpr double least_weight = 0x1p-60, most_weight = 0x1p60;
+
 /// What a batch's weight says. Only error bars differ, and the corrections of estimators that use them.
 enum class Weights {
     samples,      ///< how many samples the batch is the mean of: its variance goes with 1/weight

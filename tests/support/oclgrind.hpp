@@ -2,6 +2,7 @@
 // Unoptimised: its interpreter lacks some of what LLVM 14 makes of optimised code (freeze, noalias scopes).
 #pragma once
 
+#include <gtest/gtest.h>
 #include <sys/wait.h>
 
 #include <array>
@@ -38,6 +39,15 @@ inline std::optional<OclgrindReport> under_oclgrind(const std::string& program, 
     const int status = pclose(pipe);
     report.status = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
     return report;
+}
+
+/// The one test that `filter` names runs there, and oclgrind finds nothing.
+inline void expect_clean_under_oclgrind(const std::string& program, const std::string& filter) {
+    const auto report = under_oclgrind(program, filter);
+    if (!report) GTEST_SKIP() << "oclgrind is not installed (Debian: apt install oclgrind)";
+    EXPECT_EQ(report->status, 0) << report->output;
+    EXPECT_EQ(report->complaints(), 0) << report->output;
+    EXPECT_NE(report->output.find("[  PASSED  ] 1 test."), std::string::npos) << report->output;
 }
 
 }  // namespace clratio::test

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "clratio/state.hpp"
 #include "command.hpp"
@@ -129,29 +130,32 @@ bool is_state(const std::string& file) {
     }
 }
 
-bool is_named_in(const std::vector<std::string>& files, const std::string& file) {
-    return std::any_of(files.begin(), files.end(), [&](const auto& f) { return is_same_file(f, file); });
+std::set<std::filesystem::path> identities_of(const std::vector<std::string>& files) {
+    std::set<std::filesystem::path> all;
+    for (const auto& file : files) all.insert(identity_of(file));
+    return all;
 }
 
 void require_different(const Options& options) {
-    std::vector<std::string> files;
-    const auto read = inputs(options);
+    const auto read = identities_of(inputs(options));
+    std::set<std::filesystem::path> written;
     for (const auto& file : outputs(options)) {
-        if (is_named_in(files, file)) throw UsageError(file + ": named for two outputs");
-        if (is_named_in(read, file)) throw UsageError(file + ": an input, and an output");
+        const auto identity = identity_of(file);
+        if (!written.insert(identity).second) throw UsageError(file + ": named for two outputs");
+        if (read.contains(identity)) throw UsageError(file + ": an input, and an output");
         if (file != options.state && is_state(file))
             throw UsageError(file + ": holds a state, which an image would replace; remove it first");
-        files.push_back(file);
     }
 }
 
 /// A glob takes more than the batches where their names do not tell them from the others.
 void require_inputs_apart(const Options& options) {
     if (options.m.size() < 2) return;
-    if (!options.reference.empty() && is_named_in(options.m, options.reference))
+    if (!options.reference.empty() && identities_of(options.m).contains(identity_of(options.reference)))
         throw UsageError(options.reference + ": a batch of --m, and the --reference");
+    const auto batches = identities_of(options.t);
     for (const auto& file : options.tau)
-        if (is_named_in(options.t, file)) throw UsageError(file + ": a batch of --t, and the --tau");
+        if (batches.contains(identity_of(file))) throw UsageError(file + ": a batch of --t, and the --tau");
 }
 
 void require_error_bar(const Options& options) {
@@ -184,7 +188,7 @@ void require_weights(const Options& options) {
         throw UsageError(fmt::format("--weight: expected one number, or one for each of the {} batches, got {}",
                                      options.m.size(), options.weight.size()));
     for (const double w : options.weight)
-        if (!(w >= 0x1p-60 && w <= 0x1p60))
+        if (!(w >= clratio::least_weight && w <= clratio::most_weight))
             throw UsageError(fmt::format("--weight: expected numbers from 2^-60 to 2^60, got {}", w));
 }
 

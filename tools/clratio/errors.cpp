@@ -38,7 +38,7 @@ Plan plan_of(const Options& o) {
 }
 
 void require_outputs(const Options& o) {
-    if (!o.csv.empty() && is_same_file(o.csv, o.plot)) throw UsageError(o.csv + ": named for two outputs");
+    if (!o.csv.empty() && identity_of(o.csv) == identity_of(o.plot)) throw UsageError(o.csv + ": named for two outputs");
     require_place_for(o.csv);
     if (o.plot.empty()) return;
     require_picture_name(o.plot);

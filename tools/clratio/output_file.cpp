@@ -18,7 +18,8 @@ namespace fs = std::filesystem;
 }
 
 fs::path followed(const fs::path& file) {
-    return fs::is_symlink(fs::symlink_status(file)) ? followed(file.parent_path() / fs::read_symlink(file)) : file;
+    const bool leads_nowhere = !fs::exists(file) && fs::is_symlink(fs::symlink_status(file));
+    return leads_nowhere ? followed(file.parent_path() / fs::read_symlink(file)) : fs::weakly_canonical(file);
 }
 
 std::string target_of(const std::string& file) {
@@ -53,15 +54,15 @@ void OutputFile::commit() {
 void require_place_for(const std::string& file) {
     const auto folder = fs::path(file).parent_path();
     if (!folder.empty() && !fs::is_directory(folder)) cannot_write(file, "no folder " + folder.string());
-    std::error_code none;
-    const auto there = fs::status(file, none);
+    std::error_code failed;
+    const auto there = fs::status(file, failed);
+    if (there.type() == fs::file_type::none) cannot_write(file, failed.message());
     if (fs::exists(there) && !fs::is_regular_file(there)) cannot_write(file, "exists and is not a regular file");
 }
 
-bool is_same_file(const std::string& a, const std::string& b) {
-    if (a.empty() || b.empty()) return false;
+fs::path identity_of(const std::string& file) {
     std::error_code none;
-    return fs::weakly_canonical(fs::absolute(a), none) == fs::weakly_canonical(fs::absolute(b), none);
+    return file.empty() ? fs::path() : fs::weakly_canonical(fs::absolute(file), none);
 }
 
 }  // namespace tool

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -34,7 +35,7 @@ private:
 /// empty name is none.
 void require_place_for(const std::string& file);
 
-/// Whether both names lead to one file, whether it exists or not.
-bool is_same_file(const std::string& a, const std::string& b);
+/// The same for all names that lead to one file, whether it exists or not.
+std::filesystem::path identity_of(const std::string& file);
 
 }  // namespace tool

@@ -54,9 +54,10 @@ int picture(const Options& options) {
     if (!options.titles.empty() && options.titles.size() != options.images.size())
         throw UsageError(fmt::format("--titles has {} titles for {} images", options.titles.size(), options.images.size()));
     require_place_for(options.output);
+    const auto output = identity_of(options.output);
     std::vector<clratio::Image> images;
     for (const auto& file : options.images) {
-        if (is_same_file(file, options.output)) throw UsageError(options.output + ": an input, and the output");
+        if (identity_of(file) == output) throw UsageError(options.output + ": an input, and the output");
         images.push_back(clratio::read_image(file, options.layer));
         require_colour(images.back());
         clratio::require_same_shape(images.front(), images.back());
