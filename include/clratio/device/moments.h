@@ -55,6 +55,8 @@ CLR_FN clr_moments clr_moments_settle(clr_moments s) {
 }
 
 // Moves the means by dm, dt times their share, and adds the second moments that two parts gain by standing that far apart.
+// Only mt can take away from its sum and lose by it. Batches that do add 4 |r um dt| or more to the M2 of the residual
+// m - r t, so that all such losses together are below 2^-24 of it.
 CLR_FN clr_moments clr_moments_move(clr_moments s, clr_two dm, clr_two dt, clr_entry e) {
     const clr_two um = clr_two_scale(dm, e.spread);
     const clr_two ut = clr_two_scale(dt, e.spread);

@@ -108,15 +108,17 @@ CLR_FN clr_two clr_two_scale(clr_two x, clr_real y) {
 // a * b, rounded, where its sum with something must not become one fma: compilers that contract leave an fma alone.
 CLR_FN clr_real clr_rounded_product(clr_real a, clr_real b) { return clr_fma(a, b, (clr_real)(-0.0f)); }
 
-// x + a b as a loose pair, of loose pairs: 5 roundings, each below 2^-24 of the parts of the new lo. What rounding a.hi b.hi
-// loses and what its sum with x.hi does are one fma together: two operations less than a gathered product.
+// x + a b as a loose pair, of loose pairs, for sums whose parts seldom have opposite signs: 5 roundings, each below 2^-24 of
+// the parts of the new lo. The first fma may round an exact product, not a float: where a.hi b.hi takes away more than half
+// of x.hi, 2^-24 of x.hi is lost.
 CLR_FN clr_two clr_two_gather_product(clr_two x, clr_two a, clr_two b) {
-    const clr_real s = x.hi + clr_rounded_product(a.hi, b.hi), v = s - x.hi;
+    const clr_real s = clr_fma(a.hi, b.hi, x.hi), v = s - x.hi;
     const clr_real rest = clr_fma(a.lo, b.hi, clr_fma(a.hi, b.hi, -v));
-    return clr_two_make(s, (x.lo + (x.hi - (s - v))) + clr_fma(a.lo, b.lo, clr_fma(a.hi, b.lo, rest)));
+    return clr_two_make(s, (x.lo + (x.hi - (s - v))) + clr_fma(clr_two_nearest(a), b.lo, rest));
 }
 
-// The same for a tight b.
+// x + a b as a loose pair for a tight b, of any signs: 5 such roundings. What rounding a.hi b.hi loses and what its sum with
+// x.hi does are one fma together: two operations less than the sum of x and a product.
 CLR_FN clr_two clr_two_gather_times(clr_two x, clr_two a, clr_two b) {
     const clr_real s = x.hi + clr_rounded_product(a.hi, b.hi), v = s - x.hi;
     const clr_real rest = clr_fma(a.lo, b.hi, clr_fma(a.hi, b.hi, -v));
