@@ -189,6 +189,43 @@ CLR_RARE_FN clr_spread clr_spread_within(clr_planes base, const clr_groups* grou
     return clr_join_groups(base, groups, whole, clr_evidence_of_group(groups->of[0], 0), tau, ask, i).spread;
 }
 
+CLR_FN clr_rest clr_rest_but(clr_planes base, const clr_groups* groups, uint but, ulong i) {
+    clr_rest rest = clr_rest_none();
+    for (uint g = 0; g < groups->count; ++g) {
+        if (g == but || !clr_holds(groups, g)) continue;
+        const clr_record group = clr_load_group(base, groups, g, i);
+        rest = clr_rest_weigh(rest, group.moments, group.weight.hi);
+    }
+    rest = clr_rest_center(rest);
+    for (uint g = 0; g < groups->count; ++g) {
+        if (g == but || !clr_holds(groups, g)) continue;
+        const clr_record group = clr_load_group(base, groups, g, i);
+        rest = clr_rest_scatter(rest, group.moments, group.weight.hi);
+    }
+    return rest;
+}
+
+// From the beginning; where a slope is in doubt the other groups are asked.
+CLR_RARE_FN void clr_cross_again(clr_cross* to, clr_planes base, const clr_groups* groups, clr_whole whole, clr_real tau,
+                                 clr_question ask, ulong i) {
+    const clr_joint j =
+        clr_join_groups(base, groups, whole, clr_evidence_of_group(groups->of[0], 0), tau, ask, i);
+    clr_cross c = clr_cross_begin(j.folds, j.spread);
+    for (uint g = 0; g < groups->count; ++g) {
+        if (!clr_holds(groups, g)) continue;
+        const clr_record group = clr_load_group(base, groups, g, i);
+        const clr_part part = clr_part_in(groups, g, group, j.whole);
+        clr_others others = clr_others_than(c, j.all.moments, group.moments, part);
+        if (clr_any(clr_slope_in_doubt(others))) {
+            const clr_rest rest = clr_rest_but(base, groups, g, i);
+            others = clr_settle_doubt(others, rest);
+            c.untold = c.untold || clr_is_untold(others, rest);
+        }
+        c = clr_cross_add(c, j.all.moments, others, group.moments, part);
+    }
+    *to = c;
+}
+
 CLR_FN clr_joint clr_join(clr_planes base, const clr_groups* groups, clr_whole whole, clr_evidence n, clr_real tau,
                           clr_question ask, ulong i) {
     clr_joint j = clr_join_groups(base, groups, whole, n, tau, ask, i);
@@ -197,12 +234,24 @@ CLR_FN clr_joint clr_join(clr_planes base, const clr_groups* groups, clr_whole w
         if (clr_any(clr_has_delta_error(j))) j.spread = clr_spread_within(base, groups, whole, tau, ask, i);
     }
     if (!clr_asks_line(ask)) return j;
+    const bool crossfits = ask.estimator == CLR_ESTIMATOR_CROSSFIT_REGRESSION;
     const clr_real slope = clr_slope_of_regression(j.spread.mt, j.spread.tt);
+    j.cross = clr_cross_begin(j.folds, j.spread);
     for (uint g = 0; g < groups->count; ++g) {
         if (!clr_holds(groups, g)) continue;
         const clr_record group = clr_load_group(base, groups, g, i);
+        const clr_part part = clr_part_in(groups, g, group, j.whole);
         clr_prefetch_group(base, groups, g, ask, 2, i);
-        j.folds = clr_fold_line(j.folds, j.all.moments, slope, group.moments, clr_part_in(groups, g, group, j.whole));
+        j.folds = clr_fold_line(j.folds, j.all.moments, slope, group.moments, part);
+        if (!crossfits) continue;
+        const clr_others others = clr_others_than(j.cross, j.all.moments, group.moments, part);
+        j.cross = clr_cross_add(j.cross, j.all.moments, others, group.moments, part);
+    }
+    if (crossfits && clr_any(j.cross.margin < (clr_real)(0.0f))) {
+        clr_cross asked;  // taken over part by part: a copy of the whole would keep j in memory
+        clr_cross_again(&asked, base, groups, whole, tau, ask, i);
+        j.cross.sum = asked.sum;
+        j.cross.untold = asked.untold;
     }
     j.spread.line = clr_line_of_groups(j.all.moments, slope, j.folds);
     return j;

@@ -258,7 +258,7 @@ TEST(Estimator, device_intervals_match_the_reference) {
 }
 
 TEST(Estimator, device_has_the_twins_bits_at_every_shape) {
-    GroupedInput in = input_of(3, 11);
+    GroupedInput in = with_fireflies(input_of(3, 11));
     in.m[4][9] = in.t[7][300] = std::numeric_limits<float>::quiet_NaN();
     std::vector<std::vector<TwinValue>> twin;
     for (std::size_t i = 0; i < values; ++i) twin.push_back(twins(in, i));

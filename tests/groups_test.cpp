@@ -139,7 +139,7 @@ TEST(Groups, joint_means_of_groups_are_as_near_as_the_groups) {
 }
 
 // Then the ratio without that group has no denominator, and the slope without it is 0: neither is what rounding leaves.
-TEST(Groups, only_ratios_fall_back_where_all_t_is_in_one_group) {
+TEST(Groups, fall_back_where_all_t_is_in_one_group) {
     const GroupedInput in = input_of(4);
     const float tau = 1.25f;
     int left = 0;
@@ -159,7 +159,7 @@ TEST(Groups, only_ratios_fall_back_where_all_t_is_in_one_group) {
             return read_twin(groups, tau, ask);
         };
         const auto crossfit = read(CLR_ESTIMATOR_CROSSFIT_REGRESSION);
-        EXPECT_FALSE(crossfit.flags & CLR_FLAG_FELL_BACK) << i;
+        EXPECT_TRUE(crossfit.flags & CLR_FLAG_FELL_BACK) << "the first group's others do not tell its slope, value " << i;
         const double size = std::fabs(estimate(want, Estimator::ratio, static_cast<double>(tau))) +
                             8 * standard_error(want, Estimator::ratio, static_cast<double>(tau));
         EXPECT_NEAR(static_cast<double>(crossfit.value),
@@ -174,6 +174,79 @@ TEST(Groups, only_ratios_fall_back_where_all_t_is_in_one_group) {
         left += std::fma(-part.a, dt, j.q.denominator) != 0;
     }
     EXPECT_GT(left, 0) << "planted fault: without a least part of the whole, the mean of the others is not 0";
+}
+
+namespace {
+
+device::clr_question asks_crossfit() {
+    device::clr_question ask{};
+    ask.estimator = CLR_ESTIMATOR_CROSSFIT_REGRESSION;
+    ask.outputs = CLR_WRITE_FLAGS;
+    return ask;
+}
+
+/// How far clr_fold_cross may be from the cross-fitted regression in double: groups.h bounds each slope.
+double crossfit_bound(std::span<const Statistics> groups, double tau) {
+    Statistics all;
+    for (const auto& g : groups) all.merge(g);
+    double bound = 16 * 0x1p-24 * std::fabs(all.mean_m);
+    for (const auto& g : groups) {
+        Statistics rest;
+        for (const auto& other : groups)
+            if (&other != &g) rest.merge(other);
+        if (!(rest.m2_t > 0)) continue;
+        const double moved = g.weight / all.weight * std::fabs(g.mean_t - tau);
+        const double root = std::sqrt(rest.m2_m / rest.m2_t), slope = std::fabs(rest.c_mt / rest.m2_t);
+        bound += moved * ((group_count + 2) * 0x1p-14 * root + 16 * 0x1p-24 * slope);
+    }
+    return bound;
+}
+
+/// Without asking the other groups where sums cancel.
+float trusting_crossfit(std::span<const TwinValue> groups, float tau) {
+    using namespace device;
+    const auto j = join_twin(groups, tau, asks_crossfit());
+    float cross = 0;
+    for (const auto& g : groups) {
+        const clr_part part = clr_part_of(g.record.weight, j.whole);
+        const float slope = clr_others_than(j.cross, j.all.moments, g.record.moments, part).slope;
+        cross += part.p.hi * slope * (clr_two_gap(g.record.moments.t, j.all.moments.t) + j.folds.control_error);
+    }
+    return j.all.moments.m.hi - cross;
+}
+
+}  // namespace
+
+// 23 batches leave scatter within the groups, 5 leave none, and 4 leave a group without a batch.
+TEST(Groups, crossfit_holds_its_bound_where_one_batch_outweighs_all_others) {
+    const float tau = 1.25f;
+    for (const std::size_t batches : {batch_count, std::size_t{5}, std::size_t{4}}) {
+        const GroupedInput in = with_fireflies(input_of(6, batches));
+        int caught = 0;
+        for (std::size_t i = 0; i < values; ++i) {
+            const auto want = reference(in, i);
+            const auto groups = twins(in, i);
+            const double exact = estimate(want, Estimator::crossfit_regression, static_cast<double>(tau));
+            const double bound = crossfit_bound(want, static_cast<double>(tau));
+            const auto got = read_twin(groups, tau, asks_crossfit());
+            EXPECT_NEAR(static_cast<double>(got.value), exact, bound) << batches << " batches, value " << i;
+            EXPECT_FALSE(got.flags & CLR_FLAG_FELL_BACK) << batches << " batches, value " << i;
+            caught += std::fabs(static_cast<double>(trusting_crossfit(groups, tau)) - exact) > bound;
+        }
+        EXPECT_GT(caught, static_cast<int>(values / 20)) << "planted fault: slopes in doubt are taken, " << batches;
+    }
+}
+
+// Two batches in two groups leave one batch to take each slope from.
+TEST(Groups, crossfit_says_where_the_others_do_not_tell_a_slope) {
+    const GroupedInput in = with_fireflies(input_of(6, 2));
+    for (std::size_t i = 0; i < values; ++i) {
+        const auto groups = twins(in, i);
+        const auto got = read_twin(groups, 1.25f, asks_crossfit());
+        const bool varies = in.t[0][i] != in.t[1][i];
+        EXPECT_EQ((got.flags & CLR_FLAG_FELL_BACK) != 0, varies) << i;
+        EXPECT_EQ(got.value, join_twin(groups, 1.25f, asks_crossfit()).all.moments.m.hi) << i;
+    }
 }
 
 // A batch's own index, not the order of arrival, chooses its group.

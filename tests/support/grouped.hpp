@@ -1,6 +1,7 @@
 // Batches whose values are asked for group by group, and what the reference and the twin make of them.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -30,6 +31,19 @@ inline GroupedInput input_of(std::uint64_t seed, std::size_t batches = batch_cou
         in.m.push_back(in.t.back());
         for (auto& x : in.m.back()) x *= draw.uniform() < 0.3 ? 0 : static_cast<float>(0.5 + draw.uniform());
         in.weight.push_back(static_cast<double>(1 + k % 4));
+    }
+    return in;
+}
+
+/// One batch of each value is far off in m, in t, or in both, by up to 1e8; every eighth value has t = 2 everywhere.
+inline GroupedInput with_fireflies(GroupedInput in) {
+    const std::size_t batches = in.m.size();
+    for (std::size_t i = 0; i < values; ++i) {
+        const std::size_t k = i % batches, what = i % 4;
+        const float far = std::pow(10.0f, static_cast<float>(i % 9));
+        if (what != 1) in.m[k][i] = (in.m[k][i] + 0.5f) * far;
+        if (what != 2) in.t[k][i] *= far;
+        for (std::size_t b = 0; i % 8 == 7 && b < batches; ++b) in.t[b][i] = 2;
     }
     return in;
 }

@@ -37,6 +37,18 @@ struct TwinValue {
     }
 };
 
+/// All groups but one, `but` being one of them.
+inline device::clr_rest rest_without(std::span<const TwinValue> groups, const TwinValue& but) {
+    using namespace device;
+    clr_rest rest = clr_rest_none();
+    for (const auto& g : groups)
+        if (&g != &but) rest = clr_rest_weigh(rest, g.record.moments, g.record.weight.hi);
+    rest = clr_rest_center(rest);
+    for (const auto& g : groups)
+        if (&g != &but) rest = clr_rest_scatter(rest, g.record.moments, g.record.weight.hi);
+    return rest;
+}
+
 /// What the kernels know of a value's groups together.
 inline device::clr_joint join_twin(std::span<const TwinValue> groups, float tau, const device::clr_question& ask) {
     using namespace device;
@@ -66,7 +78,14 @@ inline device::clr_joint join_twin(std::span<const TwinValue> groups, float tau,
     for (const auto& g : groups) j.folds = clr_fold(j.folds, j.all.moments, j.q, g.record.moments, part(g));
     j.spread = clr_spread_of_groups(j.all.moments, j.q.quotient, j.folds);
     const float slope = clr_slope_of_regression(j.spread.mt, j.spread.tt);
-    for (const auto& g : groups) j.folds = clr_fold_line(j.folds, j.all.moments, slope, g.record.moments, part(g));
+    j.cross = clr_cross_begin(j.folds, j.spread);
+    for (const auto& g : groups) {
+        j.folds = clr_fold_line(j.folds, j.all.moments, slope, g.record.moments, part(g));
+        const clr_rest rest = rest_without(groups, g);
+        const auto others = clr_settle_doubt(clr_others_than(j.cross, j.all.moments, g.record.moments, part(g)), rest);
+        j.cross = clr_cross_add(j.cross, j.all.moments, others, g.record.moments, part(g));
+        j.cross.untold = j.cross.untold || clr_is_untold(others, rest);
+    }
     j.spread.line = clr_line_of_groups(j.all.moments, slope, j.folds);
     j.n = n;
     return j;

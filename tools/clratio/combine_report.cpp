@@ -60,7 +60,7 @@ void print_flags(const Options& options, const Report& r) {
     line(options.standard_error.empty() ? 0 : r.flags.no_error_bar,
          "no error bar: fewer than two batches (a regression: three), or a constant by the zero policy");
     line(r.flags.nonfinite, "the estimate is not finite");
-    line(r.flags.fell_back, "too few batches or groups for the estimator: the ratio or the mean stands there");
+    line(r.flags.fell_back, "too few batches or groups, or others that do not vary: the ratio or the mean stands in");
     line(r.negatives, "negative inputs (counted only)");
 }
 

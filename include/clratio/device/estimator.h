@@ -188,6 +188,7 @@ typedef struct {
     clr_whole whole;
     clr_quotient q;
     clr_folds folds;
+    clr_cross cross;
     clr_spread spread;
     clr_evidence n;
 } clr_joint;
@@ -206,6 +207,7 @@ CLR_FN clr_joint clr_joint_means(clr_record all, clr_whole whole, clr_real tau, 
     j.whole = whole;
     j.q = clr_divide_means(all.moments.m, all.moments.t, tau, zero_policy);
     j.folds = clr_folds_begin(all.moments, j.q, tau);
+    j.cross = clr_cross_begin(j.folds, clr_spread_none());
     return j;
 }
 
@@ -233,14 +235,14 @@ CLR_FN clr_real clr_value_of(clr_joint j, clr_real tau, clr_question ask) {
         return clr_fma(-clr_slope_of_regression(j.spread.mt, j.spread.tt), j.folds.control_error, means.m.hi);
     if (ask.estimator == CLR_ESTIMATOR_JACKKNIFE) return clr_jackknife(j.q, j.folds);
     if (ask.estimator == CLR_ESTIMATOR_MICKEY) return clr_mickey(j.q, j.folds);
-    if (ask.estimator == CLR_ESTIMATOR_CROSSFIT_REGRESSION) return means.m.hi - j.folds.cross;
+    if (ask.estimator == CLR_ESTIMATOR_CROSSFIT_REGRESSION) return means.m.hi - j.cross.sum;
     return j.q.value;
 }
 
 // What an estimator takes from the groups. It is infinite or NaN where the others of some group do not tell.
-CLR_FN clr_real clr_sum_over_groups(clr_folds f, clr_u32 estimator) {
-    if (estimator == CLR_ESTIMATOR_JACKKNIFE) return f.shift;
-    return estimator == CLR_ESTIMATOR_MICKEY ? f.mickey : f.cross;
+CLR_FN clr_real clr_sum_over_groups(clr_joint j, clr_u32 estimator) {
+    if (estimator == CLR_ESTIMATOR_JACKKNIFE) return j.folds.shift;
+    return estimator == CLR_ESTIMATOR_MICKEY ? j.folds.mickey : j.cross.sum;
 }
 
 // Where the estimator needs more batches or groups than there are.
@@ -248,7 +250,7 @@ CLR_FN clr_mask clr_falls_back(clr_joint j, clr_u32 estimator) {
     if (estimator == CLR_ESTIMATOR_RATIO || estimator == CLR_ESTIMATOR_MEAN || estimator == CLR_ESTIMATOR_MEAN_OF_RATIOS)
         return clr_never();
     if (clr_uses_groups(estimator))
-        return j.whole.groups < (clr_uint)(2u) || !clr_is_finite(clr_sum_over_groups(j.folds, estimator));
+        return j.whole.groups < (clr_uint)(2u) || !clr_is_finite(clr_sum_over_groups(j, estimator));
     return j.n.few;
 }
 
@@ -337,12 +339,13 @@ CLR_FN clr_estimate clr_read_out(clr_joint j, clr_u32 added, clr_real tau, clr_r
     const clr_uint rules = divides    ? clr_quotient_flags(q, tau)
                            : averages ? clr_flag_if(tau == zero, CLR_FLAG_ZERO_TAU)
                                       : (clr_uint)(0u);
+    const clr_mask untold = ask.estimator == CLR_ESTIMATOR_CROSSFIT_REGRESSION ? j.cross.untold : never;
     const clr_mask some_empty = clr_uses_ratios(ask.estimator) ? r.ratios.zero_share.hi != zero && tau != zero : never;
-    e.flags =
-        (no_data ? (clr_uint)(0u)
-                 : rules | clr_flag_if(some_empty, CLR_FLAG_ZERO_DENOMINATOR) | clr_flag_if(fallen, CLR_FLAG_FELL_BACK)) |
-        clr_flag_if(no_data, CLR_FLAG_NO_DATA) | clr_flag_if(r.batches < (clr_uint)(added), CLR_FLAG_SKIPPED) |
-        clr_flag_if(e.error == infinite, CLR_FLAG_NO_ERROR_BAR) | clr_flag_unless_finite(e.value);
+    e.flags = (no_data ? (clr_uint)(0u)
+                       : rules | clr_flag_if(some_empty, CLR_FLAG_ZERO_DENOMINATOR) |
+                             clr_flag_if(fallen || untold, CLR_FLAG_FELL_BACK)) |
+              clr_flag_if(no_data, CLR_FLAG_NO_DATA) | clr_flag_if(r.batches < (clr_uint)(added), CLR_FLAG_SKIPPED) |
+              clr_flag_if(e.error == infinite, CLR_FLAG_NO_ERROR_BAR) | clr_flag_unless_finite(e.value);
     if (ask.outputs & CLR_WRITE_INTERVAL) e.flags |= clr_flag_if(e.error == zero && !no_data, CLR_FLAG_NO_SPREAD);
     return e;
 }

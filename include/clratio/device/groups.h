@@ -111,7 +111,7 @@ typedef struct {
     clr_spread between;      // of the groups' means
     clr_real shift;          // sum of p e; infinite or NaN where some t_rest is 0
     clr_real ae, aee;        // sums of a e, a e^2
-    clr_real mickey, cross;  // sums of p (r - r_rest)(t - tau) and of p beta_rest (t - tau)
+    clr_real mickey;         // sum of p (r - r_rest)(t - tau)
 } clr_folds;
 
 CLR_FN clr_folds clr_folds_begin(clr_moments all, clr_quotient q, clr_real tau) {
@@ -120,7 +120,7 @@ CLR_FN clr_folds clr_folds_begin(clr_moments all, clr_quotient q, clr_real tau) 
     f.offset = clr_two_apart(all.m, clr_two_multiply(q.quotient, all.t));
     f.control_error = clr_two_gap(all.t, clr_two_make(tau, zero));
     f.between = clr_spread_none();
-    f.shift = f.ae = f.aee = f.mickey = f.cross = zero;
+    f.shift = f.ae = f.aee = f.mickey = zero;
     return f;
 }
 
@@ -161,16 +161,117 @@ CLR_FN clr_real clr_line_distance(clr_moments group, clr_moments all, clr_real s
 
 // `within`: the pooled moments; `slope`: of the regression over all batches.
 CLR_FN clr_folds clr_fold_line(clr_folds f, clr_moments within, clr_real slope, clr_moments group, clr_part w) {
-    const clr_real dm = clr_two_gap(group.m, within.m), dt = clr_two_gap(group.t, within.t);
     const clr_real off = clr_line_distance(group, within, slope);
     f.between.line = clr_fma(w.weight * off, off, f.between.line);
-
-    const clr_real apart = w.apart * dt;
-    const clr_real tt = clr_two_gap(within.tt, group.tt) + clr_fma(-apart, dt, f.between.tt);
-    const clr_real mt = clr_two_gap(within.mt, group.mt) + clr_fma(-apart, dm, f.between.mt);
-    const clr_real least = (within.tt.hi + f.between.tt) * (clr_real)(CLR_LEAST_REST);
-    f.cross = clr_fma(w.p.hi * clr_slope_above(mt, tt, least), dt + f.control_error, f.cross);
     return f;
+}
+
+// ---- the cross-fitted correction: each group's distance from tau by the slope of all groups but that one
+
+typedef struct {
+    clr_real tt, mt;            // of all batches
+    clr_real spare_m, least_t;  // mm of all batches less the least that may be left of it, and that of tt
+    clr_real control_error;     // of clr_folds
+    clr_real sum;               // of p beta_rest (t - tau)
+    clr_real margin;            // the least of all groups
+    clr_mask untold;            // some beta_rest is 0: the others' t does not vary, though all t do
+} clr_cross;
+
+// Where sums over all cancel to less than this part of them, a slope is in doubt.
+#define CLR_CERTAIN_REST 0x1p-7f
+
+CLR_FN clr_cross clr_cross_begin(clr_folds f, clr_spread all) {
+    clr_cross c;
+    c.tt = all.tt;
+    c.mt = all.mt;
+    c.spare_m = clr_fma(all.mm, -(clr_real)(CLR_CERTAIN_REST), all.mm);
+    c.least_t = all.tt * (clr_real)(CLR_CERTAIN_REST);
+    c.control_error = f.control_error;
+    c.sum = (clr_real)(0.0f);
+    c.margin = (clr_real)(CLR_REAL_MAX);
+    c.untold = c.sum > c.sum;
+    return c;
+}
+
+// What a group's part leaves of the sums over all. Unless a margin is negative, the slope is good to (groups + 2) 2^-14 of
+// the root of mm over tt.
+typedef struct {
+    clr_real slope;
+    clr_real margin_m, margin_t;  // by which mm and tt are more than the least
+} clr_others;
+
+CLR_FN clr_others clr_others_than(clr_cross c, clr_moments within, clr_moments group, clr_part w) {
+    const clr_real dm = clr_two_gap(group.m, within.m), dt = clr_two_gap(group.t, within.t);
+    const clr_real heavy_m = w.apart * dm, heavy_t = w.apart * dt;
+    const clr_real tt = clr_fma(-heavy_t, dt, c.tt - group.tt.hi), mt = clr_fma(-heavy_t, dm, c.mt - group.mt.hi);
+    clr_others o;
+    o.slope = clr_slope_of_regression(mt, tt);
+    o.margin_m = clr_fma(-heavy_m, dm, c.spare_m - group.mm.hi);
+    o.margin_t = tt - c.least_t;
+    return o;
+}
+
+CLR_FN clr_cross clr_cross_add(clr_cross c, clr_moments within, clr_others o, clr_moments group, clr_part w) {
+    c.sum = clr_fma(w.p.hi * o.slope, clr_two_gap(group.t, within.t) + c.control_error, c.sum);
+    c.margin = o.margin_m < c.margin ? o.margin_m : c.margin;
+    c.margin = o.margin_t < c.margin ? o.margin_t : c.margin;
+    return c;
+}
+
+// The other groups one by one, in two passes, without a difference that cancels.
+typedef struct {
+    clr_real weight, near_m, near_t;  // near: the means of the first
+    clr_real m, t;                    // the sums, then the means, of distances from there
+    clr_real tt, mt;
+} clr_rest;
+
+CLR_FN clr_rest clr_rest_none(void) {
+    clr_rest r;
+    r.weight = r.near_m = r.near_t = r.m = r.t = r.tt = r.mt = (clr_real)(0.0f);
+    return r;
+}
+
+CLR_FN clr_rest clr_rest_weigh(clr_rest r, clr_moments group, clr_real weight) {
+    const clr_mask none = !(r.weight > (clr_real)(0.0f));
+    r.near_m = none ? group.m.hi : r.near_m;
+    r.near_t = none ? group.t.hi : r.near_t;
+    r.m = clr_fma(weight, clr_two_beyond(group.m, r.near_m), r.m);
+    r.t = clr_fma(weight, clr_two_beyond(group.t, r.near_t), r.t);
+    r.weight += weight;
+    return r;
+}
+
+CLR_FN clr_rest clr_rest_center(clr_rest r) {
+    const clr_real zero = (clr_real)(0.0f);
+    const clr_mask none = !(r.weight > zero);
+    const clr_real divisor = none ? (clr_real)(1.0f) : r.weight;
+    r.m = none ? zero : r.m / divisor;
+    r.t = none ? zero : r.t / divisor;
+    return r;
+}
+
+CLR_FN clr_rest clr_rest_scatter(clr_rest r, clr_moments group, clr_real weight) {
+    const clr_real dm = clr_two_beyond(group.m, r.near_m) - r.m, dt = clr_two_beyond(group.t, r.near_t) - r.t;
+    const clr_real heavy = weight * dt;
+    r.tt = clr_fma(heavy, dt, r.tt + group.tt.hi);
+    r.mt = clr_fma(heavy, dm, r.mt + group.mt.hi);
+    return r;
+}
+
+CLR_FN clr_mask clr_slope_in_doubt(clr_others o) {
+    const clr_real zero = (clr_real)(0.0f);
+    return o.margin_m < zero || o.margin_t < zero;
+}
+
+// The slope is the rest's where it was in doubt.
+CLR_FN clr_others clr_settle_doubt(clr_others o, clr_rest r) {
+    o.slope = clr_slope_in_doubt(o) ? clr_slope_of_regression(r.mt, r.tt) : o.slope;
+    return o;
+}
+
+CLR_FN clr_mask clr_is_untold(clr_others o, clr_rest r) {
+    const clr_real zero = (clr_real)(0.0f);
+    return o.margin_t < zero && !(r.tt > zero);
 }
 
 // M2 about the line, after the third pass.

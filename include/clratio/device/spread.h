@@ -33,11 +33,11 @@ CLR_FN clr_residual clr_residual_of(clr_moments s, clr_two r) {
     return d;
 }
 
-// mt / tt; 0 where tt is not above `least`.
-CLR_FN clr_real clr_slope_above(clr_real mt, clr_real tt, clr_real least) { return tt > least ? mt / tt : (clr_real)(0.0f); }
-
 // Of m on t; 0 where t does not vary.
-CLR_FN clr_real clr_slope_of_regression(clr_real mt, clr_real tt) { return clr_slope_above(mt, tt, (clr_real)(0.0f)); }
+CLR_FN clr_real clr_slope_of_regression(clr_real mt, clr_real tt) {
+    const clr_real zero = (clr_real)(0.0f);
+    return tt > zero ? mt / tt : zero;
+}
 
 // M2 about the line of this slope. It is least for the regression's own: a slope rounded to float costs 2^-48 of mm.
 CLR_FN clr_real clr_line_residual(clr_moments s, clr_real slope) {
