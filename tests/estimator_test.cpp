@@ -322,7 +322,17 @@ TEST(Estimator, too_few_batches_fall_back_and_say_so) {
     EXPECT_EQ(ratio.flags.fell_back, 0u);
 }
 
-TEST(Estimator, no_residual_spread_is_flagged_with_an_interval) {
+TEST(Estimator, gain_of_a_constant_m_is_infinite_where_t_varies) {
+    const Engine engine;
+    Moments s(engine, 3);
+    for (const float x : {1.0f, 2.0f, 4.0f}) {
+        const std::vector<float> m{1, 1, x}, t{x, 1, 1};
+        s.add(m, t);
+    }
+    EXPECT_EQ(combine(s, 1.0f, {.gain = true}).gain, (std::vector<float>{std::numeric_limits<float>::infinity(), 1, 1}));
+}
+
+TEST(Estimator, no_residual_spread_is_flagged_with_an_interval_and_with_need) {
     const Engine engine;
     Samples draw(1);
     Moments s(engine, 2);
@@ -334,6 +344,7 @@ TEST(Estimator, no_residual_spread_is_flagged_with_an_interval) {
     const Combined out = combine(s, 1.0f, {.interval = true, .method = IntervalMethod::delta});
     EXPECT_EQ(out.flag_image[0], CLR_FLAG_NO_SPREAD);
     EXPECT_EQ(out.flag_image[1], 0u);
+    EXPECT_EQ(combine(s, 1.0f, {.needed = true, .target = .1f}).flag_image, out.flag_image);
     EXPECT_EQ(out.lower[0], 1.0f);
     EXPECT_EQ(out.upper[0], 1.0f);
 }

@@ -416,6 +416,9 @@ public:
         std::filesystem::copy_file(batches_.m_file(k), folder_ / ("m_" + std::to_string(k) + ".exr"));
         std::filesystem::copy_file(batches_.t_file(k), folder_ / ("t_" + std::to_string(k) + ".exr"));
     }
+    void write_of_another_size(const std::string& name) const {
+        write_exr(folder_ / name, {{.data = {{0, 0}, {1, 1}}, .display = {{0, 0}, {1, 1}}}});
+    }
     std::string operator/(const std::string& name) const { return folder_ / name; }
     Words watch(const std::string& state) const {
         return {"combine", "--watch",  folder_ / "", "--m",     "m_*.exr", "--t",
@@ -445,6 +448,7 @@ TEST(StateTool, watch_adds_what_a_slow_renderer_has_finished_and_waits_for_what_
     });
     renderer.write(0, "0000");
     wait_for(state, 1);
+    for (const char* name : {"m_0009.exr", "t_0009.exr"}) renderer.write_of_another_size(name);
     renderer.write(1, "0001", .6);
     renderer.write(2, "0002");
     wait_for(state, 2);
@@ -456,6 +460,7 @@ TEST(StateTool, watch_adds_what_a_slow_renderer_has_finished_and_waits_for_what_
     const Said said = watching.get();
     EXPECT_EQ(said.code, 0) << said.err;
     expect_in("m_0001.exr", said.err);
+    expect_in("m_0009.exr", said.err);
     EXPECT_EQ(read_state(state).ranges.text(), "[0,4)");
     EXPECT_TRUE(read_state(state).sums == batches.sums({0, 2, 3, 1}));
     EXPECT_FALSE(read_state(state).sums == batches.sums({0, 1, 2, 3})) << "planted fault: another order";
@@ -524,5 +529,5 @@ TEST(StateTool, watch_refuses_what_it_cannot_number) {
         {"combine", "--watch", scratch / "none", "--m", "m_*.exr", "--t", "t_*.exr", "--tau", "1", "-o", scratch / "o.exr"},
         1, "cannot be watched");
     expect_refused(batches.combine(0, 1) + Words{"--tau", "1", "-o", scratch / "o.exr", "--until-batches", "3"}, 2,
-                   "are for --watch");
+                   "--until-batches requires --watch");
 }

@@ -325,8 +325,11 @@ TEST(Tool, usage_errors_exit_2) {
     expect_refused(pair + Words{"--tau", "1", "a.exr", "-o", "o.exr"}, 2, "either numbers or files");
     expect_refused(pair + Words{"--tau", "1", "-o", "o.exr", "--zero", "two"}, 2, "two");
     expect_refused(pair + Words{"--tau", "1", "-o", "o.exr", "--flags", "o.exr"}, 2, "o.exr: named for two outputs");
-    expect_refused(pair + Words{"--tau", "1", "-o", "o.exr", "--estimator", "mean-of-ratios", "--stderr", "e.exr"}, 2,
-                   "--stderr");
+    const Words averaged = pair + Words{"--tau", "1", "-o", "o.exr", "--estimator", "mean-of-ratios"};
+    expect_refused(averaged + Words{"--stderr", "e.exr"}, 2, "--stderr: mean-of-ratios has no standard error");
+    expect_refused(averaged + Words{"--needed", "n.exr", "--target", "1"}, 2, "--needed: mean-of-ratios has no");
+    expect_refused(averaged + Words{"--interval", ".9", "--method", "delta"}, 2, "--method delta: mean-of-ratios has no");
+    expect_refused(averaged + Words{"--watch", "d", "--until-error", "1"}, 2, "--until-error: mean-of-ratios has no");
     const Scratch scratch;
     expect_refused(pairs("area", 1) + Words{"--tau", "1", "2", "-o", scratch / "o.exr"}, 2,
                    "2 numbers for the 3 channels of " + files("area", "m", 1)[0]);
@@ -334,6 +337,9 @@ TEST(Tool, usage_errors_exit_2) {
     for (const char* weight : {"0", "-1", "nan", "1e-46", "1e38"})
         expect_refused(numbered + Words{"--weight", weight}, 2, "--weight: expected numbers from 2^-60 to 2^60");
     expect_refused(numbered + Words{"--first-batch", "-1"}, 2, "--first-batch");
+    expect_refused(numbered + Words{"--method", "delta"}, 2, "--method requires --interval (see clratio combine --help)");
+    expect_refused(numbered + Words{"--checkpoint", "1"}, 2, "--checkpoint requires --state");
+    expect_refused(numbered + Words{"--settle", "1"}, 2, "--settle requires --watch");
     expect_refused(numbered + Words{"--needed", "n.exr", "--target", "nan"}, 2, "--target: expected a number above 0");
 }
 
@@ -458,6 +464,54 @@ TEST(Tool, compare_computes_what_it_says) {
     EXPECT_NEAR(j["relative_mse"], relative, 1e-12);
     expect_in("mean((a - r)^2 / (r^2 + epsilon)), epsilon = 0.01",
               clratio_tool({"compare", scratch / "a.exr", scratch / "r.exr"}).out);
+}
+
+TEST(Tool, what_cannot_be_compared_is_said) {
+    const Scratch scratch;
+    Image nothing = made(4, 1, std::numeric_limits<float>::quiet_NaN()), most = made(4, 1, 1);
+    write_image(scratch / "nothing.exr", nothing);
+    most.values[5] = std::numeric_limits<float>::infinity();
+    write_image(scratch / "most.exr", most);
+    expect_refused({"compare", scratch / "most.exr", scratch / "nothing.exr"}, 1,
+                   "most.exr: no value is finite in it and in " + scratch / "nothing.exr");
+    write_image(scratch / "m.exr", made(4, 1, 1));
+    const Words combine{"combine", "--m", scratch / "m.exr", "--t", scratch / "m.exr", "--tau",
+                        "1",       "-o",  scratch / "o.exr"};
+    expect_in("1 values not finite and left out", clratio_tool(combine + Words{"--reference", scratch / "most.exr"}).out);
+    const json j = json::parse(clratio_tool(combine + Words{"--reference", scratch / "most.exr", "--json"}).out);
+    EXPECT_EQ(j["compared"], 11);
+}
+
+TEST(Tool, need_where_all_batches_agree_is_flagged_and_counted) {
+    const Scratch scratch;
+    for (const int k : {0, 1}) {
+        Image m = made(4, 1, 1);
+        m.values[2] = 1 + static_cast<float>(k);
+        write_image(scratch / (std::to_string(k) + "m.exr"), m);
+        write_image(scratch / (std::to_string(k) + "t.exr"), made(4, 1, 2));
+    }
+    const Words combine{"combine",
+                        "--m",
+                        scratch / "0m.exr",
+                        scratch / "1m.exr",
+                        "--t",
+                        scratch / "0t.exr",
+                        scratch / "1t.exr",
+                        "--tau",
+                        "2",
+                        "-o",
+                        scratch / "o.exr",
+                        "--needed",
+                        scratch / "n.exr",
+                        "--target",
+                        ".1"};
+    expect_in("11  all batches agree", clratio_tool(combine).out);
+    const json j = json::parse(clratio_tool(combine + Words{"--json", "--fail-on-flag"}).out);
+    EXPECT_EQ(j["flags"]["no_spread"], 11);
+    EXPECT_EQ(j["flags"]["any"], 0);
+    const Image needed = read_image(scratch / "n.exr");
+    EXPECT_EQ(needed.values[0], 0);
+    EXPECT_GT(needed.values[2], 0);
 }
 
 TEST(Tool, devices_says_which_and_why) {

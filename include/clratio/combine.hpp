@@ -51,7 +51,7 @@ struct Combined {
     std::vector<float> bias;          ///< estimated E[ratio] - truth; +inf where it is not known
     std::vector<float> lower, upper;  ///< of the confidence interval
     std::vector<std::uint32_t> kind;  ///< IntervalKind of each value
-    std::vector<float> gain;          ///< 1 where m does not vary
+    std::vector<float> gain;          ///< +inf where t varies and m does not, 1 where neither does
     std::vector<float> needed;        ///< 0: the target is met; +inf where nothing is known
     std::uint64_t negatives = 0;      ///< negative inputs that combine_batches has read
 };
@@ -110,8 +110,8 @@ Combined combine(const Engine& engine, std::span<const float> m, std::span<const
 /// enters is infinite or NaN; below 2^-126 it loses bits, and then is 0.
 /// - ratio: mean(m) / mean(t), then times tau: no square, so every m, t and tau whose two results fit.
 /// - error bars, intervals, gain, bias and the other estimators' corrections: weight times squares and products of
-///   deviations of m and t, and 1 / mean(t), tau / mean(t). A NaN error bar has no flag; one of 0 has, with an interval,
-///   no_spread, also where squares vanished.
+///   deviations of m and t, and 1 / mean(t), tau / mean(t). A NaN error bar has no flag; one of 0 has, with an interval or
+///   needed, no_spread, also where squares vanished.
 /// - beale besides: tau times the covariance of t and the residual, over mean(t)^2 + Var(mean(t)): that is third powers,
 ///   so all magnitudes within about 2^-42 to 2^42. NaN where all |t| are below 2^-75, as the divisor is 0 then.
 ///

@@ -43,7 +43,7 @@ Files: half, float or uint EXR; scanline, tiled or multi-part; all of one size, 
 layer in one file, --layer one for all; with one colour layer in the file it is found without asking. Alpha is taken
 from the first file of --m. The output is float, ZIP, with the windows and attributes of that file and the settings used.
 --flags: a UINT for each value; 1 mean t is 0, 2 tau is 0, 4 batch skipped, 8 no data, 16 no error bar, 32 not finite,
-64 too few batches for the estimator, 128 the batches agree exactly and the interval has no width.
+64 too few batches for the estimator, 128 (with --interval or --needed) the batches agree exactly.
 --stderr: the standard error by the delta method (jackknife: its own); +inf with one batch (a regression: two). Without it
 a missing error bar is no flag that --fail-on-flag looks at. hartley-ross and mean-of-ratios: 1 where t of some batch is 0.
 
@@ -52,7 +52,8 @@ and need not be bounded; --kind, a UINT, says what the two numbers mean: 0 betwe
 2 everything. --method delta is the estimate -+ a multiple of its standard error, too narrow with few batches.
 --gain: the variance of the ratio over that of the plain mean, as the batches predict it: below 1 the ratio pays.
 --bias: of the ratio, as the batches predict it. --needed: how many more batches until the standard error is below --target
-(in units of m) or --relative-target (of the estimate); 0 where it is, inf where nothing is known.
+(in units of m) or --relative-target (of the estimate); 0 where it is, inf where nothing is known. Where all batches agree
+it is 0 too, which is no proof: flag 128.
 
 --weight: how many samples each batch is the mean of (or one number for all). --weights reliability takes them as trust
 instead: then all batches have the same variance, and error bars come out accordingly.
@@ -159,8 +160,13 @@ void require_inputs_apart(const Options& options) {
 }
 
 void require_error_bar(const Options& options) {
-    if (!options.standard_error.empty() && options.estimator == "mean-of-ratios")
-        throw UsageError("--stderr: mean-of-ratios has no standard error; all others have one");
+    const bool by_delta = options.interval && options.method == "delta";
+    for (const auto& [name, given] : {std::pair{"--stderr", !options.standard_error.empty()},
+                                      {"--until-error", options.until_error.has_value()},
+                                      {"--needed", !options.needed.empty()},
+                                      {"--method delta", by_delta}})
+        if (given && options.estimator == "mean-of-ratios")
+            throw UsageError(std::string(name) + ": mean-of-ratios has no standard error; all others have one");
     const bool ends = !options.lower.empty() || !options.upper.empty() || !options.kind.empty();
     if (ends && !options.interval)
         throw UsageError("--lower, --upper and --kind need --interval LEVEL, as in --interval .95");
@@ -216,11 +222,7 @@ void require_state(const Options& options) {
 }
 
 void require_watch(const Options& options) {
-    if (options.watch.empty()) {
-        if (options.until_batches || options.until_error)
-            throw UsageError("--until-batches and --until-error are for --watch");
-        return;
-    }
+    if (options.watch.empty()) return;
     if (options.m.size() != 1 || options.t.size() != 1)
         throw UsageError("--watch takes one pattern for --m and one for --t; quote them, or the shell expands the *");
 }
@@ -277,12 +279,14 @@ void add_options(Command& command, const std::shared_ptr<Options>& o) {
     choice("--estimator", o->estimator, estimators, "How batches become an estimate");
     choice("--zero", o->zero, zeros, "What a zero denominator gives");
     choice("--nonfinite", o->nonfinite, nonfinites, "What a NaN or an infinity in a batch does").tells(o->nonfinite_given);
-    command.option("--groups", o->groups, "Groups of batches for the estimators that need some (8, or those of --state)")
+    command
+        .option("--groups", o->groups,
+                "1 to 16 groups of batches for the estimators that need some (8, or those of --state)")
         .type("K");
     command.option("--weight", o->weight, "Samples of each batch: one number, or one for each batch").type("W");
     choice("--weights", o->weights, weightings, "What a weight says").tells(o->weights_given);
-    command.option("--interval", o->interval, "A confidence interval of this level").type("LEVEL");
-    choice("--method", o->method, methods, "How the interval is made");
+    const auto interval = command.option("--interval", o->interval, "A confidence interval of this level").type("LEVEL");
+    choice("--method", o->method, methods, "How the interval is made").needs(interval);
     const auto image = [&](const char* name, std::string& file, const char* help) {
         command.option(name, file, help).type("FILE");
     };
@@ -299,8 +303,9 @@ void add_options(Command& command, const std::shared_ptr<Options>& o) {
     command.option("--layer", o->layer, "The layer to read where a file names none").type("NAME");
     command.option("--reference", o->reference, "Print RMSE and bias of the plain mean and of the estimate against it")
         .type("FILE");
-    command.option("--state", o->state, "Keep the sums in this file, which later runs and machines can go on with")
-        .type("STATE.exr");
+    const auto state =
+        command.option("--state", o->state, "Keep the sums in this file, which later runs and machines can go on with")
+            .type("STATE.exr");
     command.flag("--resume", o->resume, "Go on with --state; listed batches that it holds are skipped");
     command.option("--first-batch", o->first_batch, "The index of the first listed batch")
         .type("N")
@@ -309,19 +314,24 @@ void add_options(Command& command, const std::shared_ptr<Options>& o) {
     command.option("--checkpoint", o->checkpoint, "Save the state every so many seconds; 0: after each launch")
         .type("SECONDS")
         .not_negative()
-        .shows_default();
-    command.option("--watch", o->watch, "Add the files of this folder that fit the patterns --m and --t as they appear")
-        .type("DIR");
+        .shows_default()
+        .needs(state);
+    const auto watch =
+        command.option("--watch", o->watch, "Add the files of this folder that fit the patterns --m and --t as they appear")
+            .type("DIR");
     command.option("--settle", o->settle, "A file counts when its size and time have stood still for so long")
         .type("SECONDS")
         .not_negative()
-        .shows_default();
+        .shows_default()
+        .needs(watch);
     command.option("--until-batches", o->until_batches, "End --watch when the sums hold so many batches")
         .type("N")
-        .positive();
+        .positive()
+        .needs(watch);
     command.option("--until-error", o->until_error, "End --watch when the RMS of the standard error is at most this")
         .type("E")
-        .positive();
+        .positive()
+        .needs(watch);
     command.flag("--fail-on-flag", o->fail_on_flag, "Exit with code 3 if any value was flagged");
     command.flag("--json", o->json, "Print one JSON object instead of text");
     command.footer(footer);

@@ -38,6 +38,7 @@ Json json_of(const Options& options, const Report& r) {
         out["bias"] = r.scores->estimate.bias;
         out["rmse_mean"] = r.scores->mean.rmse;
         out["bias_mean"] = r.scores->mean.bias;
+        out["compared"] = r.scores->estimate.compared;
     }
     return out;
 }
@@ -61,6 +62,8 @@ void print_flags(const Options& options, const Report& r) {
          "no error bar: fewer than two batches (a regression: three), or a constant by the zero policy");
     line(r.flags.nonfinite, "the estimate is not finite");
     line(r.flags.fell_back, "too few batches or groups, or others that do not vary: the ratio or the mean stands in");
+    line(options.needed.empty() ? 0 : r.flags.no_spread,
+         "all batches agree: none is needed, which says nothing of the next");
     line(r.negatives, "negative inputs (counted only)");
 }
 
@@ -87,8 +90,12 @@ void print_text(const Options& options, const Report& r) {
     }
     if (r.scores) {
         fmt::print("against {}\n  {:<15} {:>10} {:>12}\n", options.reference, "", "RMSE", "bias");
-        fmt::print("  {:<15} {:>10.6f} {:>12.6f}\n", "plain mean", r.scores->mean.rmse, r.scores->mean.bias);
-        fmt::print("  {:<15} {:>10.6f} {:>12.6f}\n", options.estimator, r.scores->estimate.rmse, r.scores->estimate.bias);
+        for (const auto& [name, score] :
+             {std::pair<std::string, Difference>{"plain mean", r.scores->mean}, {options.estimator, r.scores->estimate}}) {
+            const std::uint64_t left_out = score.values - score.compared;
+            fmt::print("  {:<15} {:>10.6f} {:>12.6f}{}\n", name, score.rmse, score.bias,
+                       left_out ? fmt::format("   {} values not finite and left out", left_out) : "");
+        }
     }
     fmt::print("decode {:.3f} s, device {:.3f} s, encode {:.3f} s\n", r.seconds.decode, r.seconds.device, r.seconds.encode);
 }

@@ -106,10 +106,14 @@ void CombineRun::fit_tau() {
     if (!reference_file_.done()) reference_ = reference_file_.next_like(keeper_.shape());
 }
 
-void CombineRun::require_fit(const Pair& pair) {
-    const bool first = keeper_.shape().channels.empty();
+void CombineRun::fit(const Pair& pair) {
+    const bool first = !is_begun();
     keeper_.fit(pair);
     if (first) fit_tau();
+}
+
+void CombineRun::require_fit(const Pair& pair) {
+    fit(pair);
     if (moments_.nonfinite != NonFinite::fail) return;
     require_finite(pair.m);
     require_finite(pair.t);

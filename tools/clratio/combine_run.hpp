@@ -14,6 +14,9 @@ public:
     bool holds(std::uint64_t index) const { return keeper_.ranges().contains(index); }
     std::uint64_t batches() const { return keeper_.ranges().count(); }
 
+    /// Throws where the images are not like those before, or, being the first, not like tau and the reference.
+    void fit(const Pair& pair);
+    bool is_begun() const { return !keeper_.shape().channels.empty(); }
     /// Adds to the sums; saves them where --checkpoint says so.
     void add(const std::vector<Pair>& pairs);
     /// Where these are all there will ever be, no state is kept, and there are no groups.

@@ -43,9 +43,11 @@ private:
         for (Job& job : folder_.settled()) {
             const std::uint64_t index = options_.first_batch + job.index;
             if (run_.holds(index)) continue;
-            if (auto pair = read(job, index)) pairs.push_back(std::move(*pair));
-            if (!pairs.empty() && pairs.size() >= std::min<std::uint64_t>(wanted(), pairs_in_a_launch(pairs.front().m)))
-                break;
+            auto pair = read(job, index);
+            if (!pair) continue;
+            run_.fit(*pair);
+            pairs.push_back(std::move(*pair));
+            if (pairs.size() >= std::min<std::uint64_t>(wanted(), pairs_in_a_launch(pairs.front().m))) break;
         }
         if (pairs.empty()) return false;
         run_.add(pairs);
@@ -53,15 +55,16 @@ private:
         return true;
     }
 
-    // A file that stands still but does not open may be half of one whose renderer died, or waits: it is looked at again
-    // when it has changed.
+    // A file that stands still but does not open may be half of one whose renderer died, or waits; one that is not like the
+    // others may be of another render. They are looked at again when they have changed.
     std::optional<Pair> read(const Job& job, std::uint64_t index) {
         const auto start = std::chrono::steady_clock::now();
         try {
             Pair pair{index, clratio::read_image(job.m, options_.layer), clratio::read_image(job.t, options_.layer)};
             seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+            if (run_.is_begun()) run_.fit(pair);
             return pair;
-        } catch (const clratio::IoError& e) {
+        } catch (const clratio::Error& e) {
             folder_.put_off(job);
             line_.clear();
             fmt::print(stderr, "clratio: waiting for another version of {}\n", e.what());

@@ -16,6 +16,7 @@ Option& Option::within(std::uint64_t least, std::uint64_t most) { return option_
 Option& Option::positive() { return option_->check(CLI::PositiveNumber), *this; }
 Option& Option::not_negative() { return option_->check(CLI::NonNegativeNumber), *this; }
 Option& Option::excludes(Option other) { return option_->excludes(other.option_), *this; }
+Option& Option::needs(Option other) { return option_->needs(other.option_), *this; }
 Option& Option::tells(bool& given) {
     option_->each([&given](const std::string&) { given = true; });
     return *this;

@@ -28,6 +28,7 @@ public:
     Option& positive();
     Option& not_negative();
     Option& excludes(Option other);
+    Option& needs(Option other);
     Option& tells(bool& given);  ///< sets it where the option is there
 
 private:

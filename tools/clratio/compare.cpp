@@ -16,6 +16,8 @@ int compare(const Options& options) {
     const auto image = clratio::read_image(options.image, options.layer);
     const auto reference = clratio::read_image(options.reference, options.layer);
     const Difference d = difference(image, reference);
+    if (d.compared == 0)
+        throw clratio::IoError(image.path, image.layer, "no value is finite in it and in " + reference.path);
     if (options.json) {
         print(Json{{"values", d.values},
                    {"compared", d.compared},

@@ -47,7 +47,9 @@ int run_command(int argc, char** argv) {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& e) {
         if (e.get_exit_code() == 0) return app.exit(e);
-        return fail(std::string(e.what()) + " (see clratio --help)", tool::usage);
+        const auto called = app.get_subcommands();
+        const std::string help = called.empty() ? "clratio --help" : "clratio " + called.front()->get_name() + " --help";
+        return fail(std::string(e.what()) + " (see " + help + ")", tool::usage);
     }
     if (!run) return fail("a subcommand is needed: devices, combine, ... (see clratio --help)", tool::usage);
     clratio::set_image_threads(std::thread::hardware_concurrency());

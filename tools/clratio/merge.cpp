@@ -42,8 +42,9 @@ int merge(const Options& options) {
                {"height", shape.height()},
                {"channels", shape.channels}});
     else
-        fmt::print("{}: {} batches {} of {} states, {}x{} pixels, {} channels\n", options.output, merged.sums.batches(),
-                   merged.ranges.text(), options.states.size(), shape.width(), shape.height(), shape.channels.size());
+        fmt::print("{}: {} batches {} of {} state{}, {}x{} pixels, {} channels\n", options.output, merged.sums.batches(),
+                   merged.ranges.text(), options.states.size(), options.states.size() == 1 ? "" : "s", shape.width(),
+                   shape.height(), shape.channels.size());
     return ok;
 }
 

@@ -281,9 +281,11 @@ CLR_FN clr_real clr_error_of(clr_joint j, clr_mask fallen, clr_u32 estimator) {
     return by_delta ? clr_delta_error(q, s, n) : error;
 }
 
+// 1 where neither varies.
 CLR_FN clr_real clr_gain_of(clr_spread s) {
-    const clr_mask flat = !(s.mm > (clr_real)(0.0f));
-    return flat ? (clr_real)(1.0f) : clr_abs(s.ratio.mm) / (flat ? (clr_real)(1.0f) : s.mm);
+    const clr_real zero = (clr_real)(0.0f), one = (clr_real)(1.0f), residual = clr_abs(s.ratio.mm);
+    const clr_mask flat = !(s.mm > zero);
+    return flat ? (residual > zero ? (clr_real)(INFINITY) : one) : residual / (flat ? one : s.mm);
 }
 
 CLR_FN clr_real clr_needed_of(clr_real value, clr_real error, clr_evidence n, clr_question ask) {
@@ -346,7 +348,8 @@ CLR_FN clr_estimate clr_read_out(clr_joint j, clr_u32 added, clr_real tau, clr_r
                              clr_flag_if(fallen || untold, CLR_FLAG_FELL_BACK)) |
               clr_flag_if(no_data, CLR_FLAG_NO_DATA) | clr_flag_if(r.batches < (clr_uint)(added), CLR_FLAG_SKIPPED) |
               clr_flag_if(e.error == infinite, CLR_FLAG_NO_ERROR_BAR) | clr_flag_unless_finite(e.value);
-    if (ask.outputs & CLR_WRITE_INTERVAL) e.flags |= clr_flag_if(e.error == zero && !no_data, CLR_FLAG_NO_SPREAD);
+    if (ask.outputs & (CLR_WRITE_INTERVAL | CLR_WRITE_NEEDED))
+        e.flags |= clr_flag_if(e.error == zero && !no_data, CLR_FLAG_NO_SPREAD);
     return e;
 }
 

@@ -13,8 +13,8 @@ CLR_NAMESPACE_BEGIN
 #define CLR_FLAG_NO_DATA 8u           // every batch was left out: the value is 0
 #define CLR_FLAG_NO_ERROR_BAR 16u     // the standard error is +inf: fewer than two batches, or a zero policy's constant
 #define CLR_FLAG_NONFINITE 32u        // the estimate itself is NaN or infinite
-#define CLR_FLAG_FELL_BACK 64u        // too few batches or groups, or others that do not vary: the ratio or the mean stands in
-#define CLR_FLAG_NO_SPREAD 128u       // the error bar is 0: the batches agree exactly, which says nothing of the next one
+#define CLR_FLAG_FELL_BACK 64u   // too few batches or groups, or others that do not vary: the ratio or the mean stands in
+#define CLR_FLAG_NO_SPREAD 128u  // the error bar is 0: the batches agree exactly, which says nothing of the next one
 #define CLR_FLAG_BITS 8
 
 // What stands in for tau m / t where the mean of t is 0.
