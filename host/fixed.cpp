@@ -181,19 +181,6 @@ int number(const std::string& text) {
     return n;
 }
 
-FixedOptions options_of(const Snapshot& snapshot) {
-    if (snapshot.kind != "fixed") throw InvalidArgument("snapshot", "kind fixed", snapshot.kind);
-    FixedOptions o;
-    for (const auto& [name, value] : snapshot.settings) {
-        if (name == "nonfinite" && value == "fail") o.nonfinite = NonFinite::fail;
-        if (name == "resolution") o.resolution = number(value);
-        if (name == "range") o.range = number(value);
-    }
-    if (settings_of(o) != snapshot.settings)
-        throw InvalidArgument("snapshot", "settings of a fixed state, as " + text(settings_of({})), text(snapshot.settings));
-    return o;
-}
-
 std::uint64_t words_of(const Shape& shape) { return shape.limbs * shape.bytes / sizeof(std::uint32_t); }
 
 std::string word_name(const Shape& shape, std::uint64_t word) {
@@ -238,6 +225,19 @@ void check_target(const State& s, const Moments& into) {
 }
 
 }  // namespace
+
+FixedOptions fixed_options(const Snapshot& snapshot) {
+    if (snapshot.kind != "fixed") throw InvalidArgument("snapshot", "kind fixed", snapshot.kind);
+    FixedOptions o;
+    for (const auto& [name, value] : snapshot.settings) {
+        if (name == "nonfinite" && value == "fail") o.nonfinite = NonFinite::fail;
+        if (name == "resolution") o.resolution = number(value);
+        if (name == "range") o.range = number(value);
+    }
+    if (settings_of(o) != snapshot.settings)
+        throw InvalidArgument("snapshot", "settings of a fixed state, as " + text(settings_of({})), text(snapshot.settings));
+    return o;
+}
 
 device::clr_fixed_state State::header() const {
     return {power(options.resolution),
@@ -405,7 +405,7 @@ Snapshot FixedMoments::snapshot() const {
 }
 
 FixedMoments::FixedMoments(const Engine& engine, const Snapshot& snapshot)
-    : FixedMoments(engine, snapshot.values, options_of(snapshot)) {
+    : FixedMoments(engine, snapshot.values, fixed_options(snapshot)) {
     State& s = *state_;
     s.weight = weight_of(snapshot, s.options);
     s.batches = snapshot.groups.front().batches;

@@ -26,6 +26,10 @@ struct FixedOptions {
     std::uint64_t most_weight() const { return (std::uint64_t{1} << (63 - resolution - range)) - 1; }
 };
 
+/// The options of a FixedMoments that the snapshot was taken of. Errors: InvalidArgument for another kind, a setting that is
+/// missing, unknown, or has an unknown value.
+FixedOptions fixed_options(const Snapshot& snapshot);
+
 /// The device buffers of a state, all of whole numbers, one after the other in plane_stride() of Moments. Of 64 bits: m and
 /// t (sums, in units of 2^-resolution), weight; mm, tt and mt (sums of products) low limbs, then high limbs, two's
 /// complement. Of 32 bits: batches. weight and batches exist with NonFinite::skip and are null otherwise.

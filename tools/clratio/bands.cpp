@@ -5,7 +5,7 @@
 namespace tool {
 namespace {
 
-using clratio::Combined, clratio::CombineOptions, clratio::HostBatch, clratio::Moments, clratio::Tau;
+using clratio::Combined, clratio::CombineOptions, clratio::FixedMoments, clratio::HostBatch, clratio::Moments, clratio::Tau;
 
 constexpr std::uint64_t values_in_a_band = 1 << 19;  // of 2^16 .. 2^20 the fastest
 
@@ -49,28 +49,49 @@ CombineOptions plain_mean(const CombineOptions& options) {
     return {.estimator = clratio::Estimator::mean, .zero = options.zero, .flag_image = false};
 }
 
+Moments moments_of(const Moments& state) { return state; }
+Moments moments_of(const FixedMoments& state) { return state.moments(); }
+
+std::uint64_t outside(const Moments&) { return 0; }
+std::uint64_t outside(const FixedMoments& state) { return state.outside(); }
+
 }  // namespace
 
-Bands::Bands(const clratio::Engine& engine, std::uint64_t values, std::uint64_t channels, clratio::MomentsOptions options)
+Sums sums_of(const clratio::Snapshot& snapshot) {
+    if (snapshot.kind != "fixed") return {clratio::moments_options(snapshot), {}};
+    const auto fixed = clratio::fixed_options(snapshot);
+    return {{.nonfinite = fixed.nonfinite}, fixed};
+}
+
+Bands::Bands(const clratio::Engine& engine, std::uint64_t values, std::uint64_t channels, const Sums& sums)
     : engine_(engine), values_(values), band_(std::max(values_in_a_band / channels, std::uint64_t{1}) * channels),
-      options_(options) {}
+      sums_(sums) {}
 
 Bands::Bands(const clratio::Engine& engine, const clratio::Snapshot& sums, std::uint64_t channels)
-    : Bands(engine, sums.values, channels, clratio::moments_options(sums)) {
+    : Bands(engine, sums.values, channels, sums_of(sums)) {
     for (std::uint64_t band = 0; band < bands(); ++band) {
         auto part = clratio::slice(sums, begin(band), size(band));
         if (band == 0) {
             part.negatives = sums.negatives;
             part.skipped = sums.skipped;
         }
-        states_.emplace_back(engine_, part);
+        if (sums_.fixed)
+            states_.emplace_back(FixedMoments(engine_, part));
+        else
+            states_.emplace_back(Moments(engine_, part));
     }
 }
 
+Bands::State Bands::make(std::uint64_t band) const {
+    if (sums_.fixed) return FixedMoments(engine_, size(band), *sums_.fixed);
+    return Moments(engine_, size(band), sums_.moments);
+}
+
 clratio::Snapshot Bands::snapshot() const {
-    clratio::Snapshot all = states_.front().snapshot();
+    const auto taken = [](const State& state) { return std::visit([](const auto& s) { return s.snapshot(); }, state); };
+    clratio::Snapshot all = taken(states_.front());
     for (auto& plane : all.planes) plane.words.reserve(values_);
-    for (std::uint64_t band = 1; band < bands(); ++band) clratio::append(all, states_[band].snapshot());
+    for (std::uint64_t band = 1; band < bands(); ++band) clratio::append(all, taken(states_[band]));
     return all;
 }
 
@@ -84,7 +105,7 @@ std::vector<HostBatch> Bands::slices(std::uint64_t band, std::span<const HostBat
 void Bands::add(std::span<const HostBatch> batches) {
     for (std::uint64_t band = 0; band < bands(); ++band) {
         if (band == states_.size()) states_.push_back(make(band));
-        states_[band].add(slices(band, batches));
+        std::visit([&](auto& state) { state.add(slices(band, batches)); }, states_[band]);
     }
 }
 
@@ -93,15 +114,17 @@ ReadOut Bands::read_out(const Tau& tau, const Wanted& wanted) const {
     Combined chosen, mean;
     for (std::uint64_t band = 0; band < bands(); ++band) {
         const Tau part = slice(tau, begin(band), size(band));
-        chosen = clratio::combine(states_[band], part, wanted.options, std::move(chosen));
+        const Moments state = std::visit([](const auto& s) { return moments_of(s); }, states_[band]);
+        chosen = clratio::combine(state, part, wanted.options, std::move(chosen));
         reserve(out.chosen, chosen, values_);
         append(out.chosen, chosen);
         if (wanted.mean) {
-            mean = clratio::combine(states_[band], part, plain_mean(wanted.options), std::move(mean));
+            mean = clratio::combine(state, part, plain_mean(wanted.options), std::move(mean));
             reserve(out.mean, mean, values_);
             append(out.mean, mean);
         }
-        out.chosen.negatives += states_[band].negatives();
+        out.chosen.negatives += std::visit([](const auto& s) { return s.negatives(); }, states_[band]);
+        out.outside += std::visit([](const auto& s) { return outside(s); }, states_[band]);
     }
     return out;
 }

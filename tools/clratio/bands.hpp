@@ -3,9 +3,11 @@
 
 #include <optional>
 #include <span>
+#include <variant>
 #include <vector>
 
 #include "clratio/combine.hpp"
+#include "clratio/fixed.hpp"
 
 namespace tool {
 
@@ -16,7 +18,17 @@ struct Wanted {
 
 struct ReadOut {
     clratio::Combined chosen, mean;
+    std::uint64_t outside = 0;  ///< finite values of batches that fixed point could not hold
 };
+
+/// What is kept of the batches. Whole numbers, where `fixed` says so, know neither groups nor ratios nor reliability.
+struct Sums {
+    clratio::MomentsOptions moments;
+    std::optional<clratio::FixedOptions> fixed;
+};
+
+/// Of a state that was kept.
+Sums sums_of(const clratio::Snapshot& snapshot);
 
 /// Of 1 to 8 batches that are all there are, without moments: the same bits.
 ReadOut read_at_once(const clratio::Engine& engine, std::span<const clratio::HostBatch> batches, const clratio::Tau& tau,
@@ -24,7 +36,7 @@ ReadOut read_at_once(const clratio::Engine& engine, std::span<const clratio::Hos
 
 class Bands {
 public:
-    Bands(const clratio::Engine& engine, std::uint64_t values, std::uint64_t channels, clratio::MomentsOptions options);
+    Bands(const clratio::Engine& engine, std::uint64_t values, std::uint64_t channels, const Sums& sums);
 
     /// Goes on with the sums of a whole image.
     Bands(const clratio::Engine& engine, const clratio::Snapshot& sums, std::uint64_t channels);
@@ -39,13 +51,14 @@ private:
     std::uint64_t bands() const { return (values_ + band_ - 1) / band_; }
     std::uint64_t begin(std::uint64_t band) const { return band * band_; }
     std::uint64_t size(std::uint64_t band) const { return std::min(band_, values_ - begin(band)); }
-    clratio::Moments make(std::uint64_t band) const { return {engine_, size(band), options_}; }
+    using State = std::variant<clratio::Moments, clratio::FixedMoments>;
+    State make(std::uint64_t band) const;
     std::vector<clratio::HostBatch> slices(std::uint64_t band, std::span<const clratio::HostBatch> batches) const;
 
     clratio::Engine engine_;
     std::uint64_t values_, band_;  ///< band_: a multiple of the channels, so that each band starts with the first
-    clratio::MomentsOptions options_;
-    std::vector<clratio::Moments> states_;
+    Sums sums_;
+    std::vector<State> states_;
 };
 
 }  // namespace tool

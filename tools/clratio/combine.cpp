@@ -32,7 +32,7 @@ int combine_without_state(const Options& options) {
     CombineRun run(options);
     clratio::set_image_threads(processors);
     auto pairs = reader.next();
-    if (reader.done() && !run.has_groups()) {
+    if (reader.done() && !run.needs_sums()) {
         run.read_out_at_once(pairs);
         return run.report(reader.seconds());
     }

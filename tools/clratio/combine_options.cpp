@@ -58,6 +58,11 @@ it is 0 too, which is no proof: flag 128.
 --weight: how many samples each batch is the mean of (or one number for all). --weights reliability takes them as trust
 instead: then all batches have the same variance, and error bars come out accordingly.
 
+--fixed Q keeps sums of whole numbers in units of 2^-Q: the state's bytes are the same for any order and grouping of the
+batches on any number of machines. Values up to 2^16 (--range), whole weights, 2^(63-Q-R) - 1 of them in all, no overflow;
+not for the estimators that need groups or ratios. Without it sums are two-float: any values and weights, and the same
+bits for the same batches in the same order.
+
 --state FILE keeps the sums, so that more batches can be added later or elsewhere: nothing is read twice, no batch counts
 twice. A batch's index is --first-batch (0) plus its place in the list. With --resume the run goes on with FILE if it is
 there, and skips listed batches that it holds: the same command again finishes what was stopped. FILE is replaced whole,
@@ -198,6 +203,23 @@ void require_weights(const Options& options) {
             throw UsageError(fmt::format("--weight: expected numbers from 2^-60 to 2^60, got {}", w));
 }
 
+void require_fixed(const Options& options) {
+    if (!options.fixed) return;
+    const auto needs = clratio::needs_of(options.chosen());
+    for (const auto& [option, given] :
+         {std::pair{"--groups " + fmt::format("{}", options.groups.value_or(1)), options.groups.value_or(1) > 1},
+          {"--estimator " + options.estimator, needs.groups || needs.ratios},
+          {"--weights reliability", options.weights == "reliability"},
+          {"--nonfinite propagate", options.nonfinite == "propagate"}})
+        if (given) throw UsageError(option + ": not with --fixed, which keeps the sums of single values alone");
+    const std::uint32_t bits = *options.fixed + options.range.value_or(16);
+    if (bits < 16 || bits > 48)
+        throw UsageError(fmt::format("--fixed and --range: expected 16 to 48 bits together, got {}", bits));
+    for (const double w : options.weight)
+        if (w != std::floor(w) || w < 1)
+            throw UsageError(fmt::format("--weight: with --fixed whole numbers from 1 on, got {}", w));
+}
+
 void require_enough(const Options& options) {
     const bool state_alone = !options.state.empty() && options.resume;
     if (options.m.empty() && !state_alone)
@@ -251,13 +273,19 @@ Wanted Options::wanted() const {
     return wanted;
 }
 
-clratio::MomentsOptions Options::moments() const {
+Sums Options::sums() const {
     const auto needs = clratio::needs_of(chosen());
     constexpr std::uint32_t usual_groups = 8;
-    return {.nonfinite = nonfinites.at(nonfinite),
-            .ratios = needs.ratios,
-            .groups = groups.value_or(needs.groups ? usual_groups : 1),
-            .weights = weightings.at(weights)};
+    Sums sums{{.nonfinite = nonfinites.at(nonfinite),
+               .ratios = needs.ratios,
+               .groups = groups.value_or(needs.groups ? usual_groups : 1),
+               .weights = weightings.at(weights)},
+              {}};
+    if (!fixed) return sums;
+    sums.fixed.emplace().nonfinite = sums.moments.nonfinite;
+    sums.fixed->resolution = static_cast<int>(*fixed);
+    if (range) sums.fixed->range = static_cast<int>(*range);
+    return sums;
 }
 
 double Options::weight_of(std::uint64_t index) const {
@@ -285,6 +313,14 @@ void add_options(Command& command, const std::shared_ptr<Options>& o) {
         .type("K");
     command.option("--weight", o->weight, "Samples of each batch: one number, or one for each batch").type("W");
     choice("--weights", o->weights, weightings, "What a weight says").tells(o->weights_given);
+    const auto fixed =
+        command.option("--fixed", o->fixed, "Sums of whole numbers: values to the nearest multiple of 2^-Q, 24 is usual")
+            .type("Q")
+            .within(0, 48);
+    command.option("--range", o->range, "With --fixed: values up to 2^R (16); larger ones count as not finite")
+        .type("R")
+        .within(0, 48)
+        .needs(fixed);
     const auto interval = command.option("--interval", o->interval, "A confidence interval of this level").type("LEVEL");
     choice("--method", o->method, methods, "How the interval is made").needs(interval);
     const auto image = [&](const char* name, std::string& file, const char* help) {
@@ -345,6 +381,7 @@ void check(const Options& options) {
     require_error_bar(options);
     require_groups(options);
     require_weights(options);
+    require_fixed(options);
     require_state(options);
     require_watch(options);
     for (const auto& file : outputs(options)) require_place_for(file);

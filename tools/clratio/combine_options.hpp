@@ -36,6 +36,7 @@ struct Options {
     std::optional<std::uint32_t> groups;
     std::vector<double> weight;  ///< none: 1 each; one: of all; else of each listed batch
     std::string weights = "samples";
+    std::optional<std::uint32_t> fixed, range;  ///< bits after and before the point
 
     std::optional<double> interval;
     std::string method = "fieller", lower, upper, kind, bias, gain, needed;
@@ -55,7 +56,7 @@ struct Options {
     clratio::CombineOptions combine() const;
     Wanted wanted() const;
     /// Of a state that is begun here.
-    clratio::MomentsOptions moments() const;
+    Sums sums() const;
     double weight_of(std::uint64_t index) const;
 };
 

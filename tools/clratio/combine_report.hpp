@@ -28,7 +28,8 @@ struct Report {
     std::string device;
     clratio::Image shape;  ///< of the first batch, without its values
     std::uint64_t batches = 0, negatives = 0;
-    std::uint64_t held = 0;  ///< of the batches, by the state that the run began with
+    std::optional<std::uint64_t> outside;  ///< the range of --fixed, where sums are that
+    std::uint64_t held = 0;                ///< of the batches, by the state that the run began with
     std::string ranges, nonfinite;
     clratio::FlagCounts flags;
     Seconds seconds;

@@ -22,7 +22,7 @@ template <class Words, class Value> std::string name_of(const Words& words, Valu
     return std::find_if(words.begin(), words.end(), [&](const auto& word) { return word.second == value; })->first;
 }
 
-clratio::WriteOptions settings(const Options& options, const clratio::MomentsOptions& moments, const Report& report) {
+clratio::WriteOptions settings(const Options& options, const Sums& sums, const Report& report) {
     clratio::WriteOptions all{{{"clratio/version", CLRATIO_VERSION},
                                {"clratio/estimator", options.estimator},
                                {"clratio/zero", options.zero},
@@ -34,9 +34,13 @@ clratio::WriteOptions settings(const Options& options, const clratio::MomentsOpt
     const auto tell = [&](const char* name, const std::string& value) {
         all.attributes.emplace_back(std::string("clratio/") + name, value);
     };
-    if (moments.groups > 1) tell("groups", std::to_string(moments.groups));
+    if (sums.moments.groups > 1) tell("groups", std::to_string(sums.moments.groups));
+    if (sums.fixed) {
+        tell("fixed", std::to_string(sums.fixed->resolution));
+        tell("range", std::to_string(sums.fixed->range));
+    }
     if (!options.weight.empty()) tell("weight", fmt::format("{}", fmt::join(options.weight, " ")));
-    if (moments.weights != clratio::Weights::samples) tell("weights", name_of(weightings, moments.weights));
+    if (sums.moments.weights != clratio::Weights::samples) tell("weights", name_of(weightings, sums.moments.weights));
     if (options.interval) {
         tell("interval", fmt::format("{}", *options.interval));
         tell("method", options.method);
@@ -88,15 +92,14 @@ CombineRun::CombineRun(const Options& options)
     : options_(options), tau_(options.tau, options.layer, !options.output.empty()),
       reference_file_(options.reference.empty() ? std::vector<std::string>() : std::vector{options.reference},
                       options.layer),
-      keeper_(options), engine_(timed(report_.seconds.device, [] { return clratio::Engine{}; })),
-      moments_(options.moments()) {
+      keeper_(options), engine_(timed(report_.seconds.device, [] { return clratio::Engine{}; })), sums_(options.sums()) {
     report_.device = engine_.info().name;
     report_.held = batches();
     if (const auto sums = keeper_.take_sums()) {
-        moments_ = clratio::moments_options(*sums);
+        sums_ = sums_of(*sums);
         bands_.emplace(engine_, *sums, keeper_.shape().channels.size());
     }
-    report_.nonfinite = name_of(nonfinites, moments_.nonfinite);
+    report_.nonfinite = name_of(nonfinites, sums_.moments.nonfinite);
     if (bands_) fit_tau();
 }
 
@@ -114,7 +117,7 @@ void CombineRun::fit(const Pair& pair) {
 
 void CombineRun::require_fit(const Pair& pair) {
     fit(pair);
-    if (moments_.nonfinite != NonFinite::fail) return;
+    if (sums_.moments.nonfinite != NonFinite::fail) return;
     require_finite(pair.m);
     require_finite(pair.t);
 }
@@ -136,7 +139,7 @@ void CombineRun::add(const std::vector<Pair>& pairs) {
     const Accepted accepted = accept(pairs);
     const auto& batches = accepted.batches;
     if (!batches.empty()) {
-        if (!bands_) bands_.emplace(engine_, pairs.front().m.size(), keeper_.shape().channels.size(), moments_);
+        if (!bands_) bands_.emplace(engine_, pairs.front().m.size(), keeper_.shape().channels.size(), sums_);
         whole_ = false;
         timed(report_.seconds.device, [&] { bands_->add(batches); });
         whole_ = true;
@@ -150,7 +153,7 @@ void CombineRun::read_out_at_once(const std::vector<Pair>& pairs) {
     const Accepted accepted = accept(pairs);
     if (accepted.misfit) std::rethrow_exception(accepted.misfit);
     for (const Pair& pair : pairs) keeper_.added(pair);
-    const clratio::BatchOptions how{moments_.nonfinite, moments_.weights};
+    const clratio::BatchOptions how{sums_.moments.nonfinite, sums_.moments.weights};
     write(timed(report_.seconds.device,
                 [&] { return read_at_once(engine_, accepted.batches, tau_, options_.wanted(), how); }));
 }
@@ -172,6 +175,7 @@ void CombineRun::read_out() {
 
 void CombineRun::write(ReadOut&& read_out) {
     report_.negatives = read_out.chosen.negatives;
+    if (sums_.fixed) report_.outside = read_out.outside;
     const auto out = clratio::combined_image(std::move(read_out.chosen), keeper_.shape());
     report_.batches = batches();
     report_.ranges = keeper_.ranges().text();
@@ -183,7 +187,7 @@ void CombineRun::write(ReadOut&& read_out) {
         report_.scores = {difference(out.estimate, reference_), difference(mean.estimate, reference_)};
     }
     timed(report_.seconds.encode, [&] {
-        const auto with = settings(options_, moments_, report_);
+        const auto with = settings(options_, sums_, report_);
         clratio::write_image(options_.output, out.estimate, with);
         const auto image = [&](const std::string& file, const clratio::Image& values) {
             if (!file.empty()) clratio::write_image(file, values, with);

@@ -19,9 +19,9 @@ public:
     bool is_begun() const { return !keeper_.shape().channels.empty(); }
     /// Adds to the sums; saves them where --checkpoint says so.
     void add(const std::vector<Pair>& pairs);
-    /// Where these are all there will ever be, no state is kept, and there are no groups.
+    /// Where these are all there will ever be, no state is kept, and no sums are needed.
     void read_out_at_once(const std::vector<Pair>& pairs);
-    bool has_groups() const { return moments_.groups > 1; }
+    bool needs_sums() const { return sums_.fixed || sums_.moments.groups > 1; }
     /// Saves what was added since the last time; nothing where the device failed in the middle of adding.
     void save();
     /// save() after `work`, however it ends.
@@ -62,7 +62,7 @@ private:
     StateKeeper keeper_;
     clratio::Engine engine_;
     std::optional<Bands> bands_;
-    clratio::MomentsOptions moments_;
+    Sums sums_;
     clratio::Image reference_;
     bool whole_ = true;  ///< all bands hold the same batches
     double rms_error_ = 0;

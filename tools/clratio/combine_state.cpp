@@ -19,12 +19,21 @@ std::string text_of(const Settings& settings) {
     return all;
 }
 
-void require_fitting(const Options& options, const clratio::Snapshot& sums) {
-    const auto recorded = clratio::moments_options(sums);
+void require_fitting(const Options& options, const clratio::Snapshot& snapshot) {
+    const auto [recorded, fixed] = sums_of(snapshot);
     const auto named = [](const auto& entry, auto value) { return entry.second == value; };
     const auto refuse = [&](const std::string& option, const std::string& how) {
         throw UsageError(option + " does not fit --state " + options.state + ", which was recorded " + how);
     };
+    if (options.fixed && !fixed) refuse("--fixed", "without it");
+    const auto require_bits = [&](const char* name, std::optional<std::uint32_t> asked, int kept) {
+        if (asked && static_cast<int>(*asked) != kept)
+            refuse(fmt::format("{} {}", name, *asked), fmt::format("with {} {}", name, kept));
+    };
+    if (fixed) {
+        require_bits("--fixed", options.fixed, fixed->resolution);
+        require_bits("--range", options.range, fixed->range);
+    }
     const auto was = std::find_if(nonfinites.begin(), nonfinites.end(),
                                   [&](const auto& entry) { return named(entry, recorded.nonfinite); });
     if (options.nonfinite_given && nonfinites.at(options.nonfinite) != recorded.nonfinite)
