@@ -401,6 +401,7 @@ TEST(Tool, errors_exit_1_and_name_the_file) {
     refused(none, t, "1", none + ": no such file");
     refused(m, none, "1", none + ": no such file");
     refused(m, t, none, none + ": no such file");
+    expect_refused({"combine", "--m", text, none, "--t", t, t, "--tau", "1", "-o", out}, 1, none + ": no such file");
     refused(m, text, "1", text);
     refused(m, small, "1", small);
     refused(m, small, "1", m);

@@ -30,6 +30,7 @@ int combine_without_state(const Options& options) {
     clratio::set_image_threads(std::max(2u, processors) - 1);
     PairReader reader(jobs_of(options), options.layer);
     CombineRun run(options);
+    require_batches(options);
     clratio::set_image_threads(processors);
     auto pairs = reader.next();
     if (reader.done() && !run.needs_sums()) {

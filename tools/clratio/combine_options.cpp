@@ -116,14 +116,21 @@ void require_counts(const Options& options) {
                                      options.m.size(), options.t.size()));
 }
 
-/// The files of inputs, without :LAYER.
+bool is_missing(const std::string& file) {
+    std::error_code error;
+    return std::filesystem::status(file, error).type() == std::filesystem::file_type::not_found;
+}
+
+std::string without_layer(const std::string& spec) {
+    const auto colon = spec.rfind(':');
+    return colon == std::string::npos || !is_missing(spec) ? spec : spec.substr(0, colon);
+}
+
 std::vector<std::string> inputs(const Options& options) {
-    std::vector<std::string> files{options.reference};
+    std::vector<std::string> files{without_layer(options.reference)};
     for (const auto* list : {&options.m, &options.t, &options.tau})
-        if (options.watch.empty() || list == &options.tau) files.insert(files.end(), list->begin(), list->end());
-    for (auto& file : files)
-        if (const auto colon = file.rfind(':'); colon != std::string::npos && !std::filesystem::exists(file))
-            file.resize(colon);
+        for (const auto& spec : *list)
+            if (options.watch.empty() || list == &options.tau) files.push_back(without_layer(spec));
     return files;
 }
 
@@ -385,6 +392,12 @@ void check(const Options& options) {
     require_state(options);
     require_watch(options);
     for (const auto& file : outputs(options)) require_place_for(file);
+}
+
+void require_batches(const Options& options) {
+    for (const auto* list : {&options.m, &options.t})
+        for (const auto& spec : *list)
+            if (is_missing(without_layer(spec))) throw clratio::IoError(without_layer(spec), "", "no such file");
 }
 
 }  // namespace tool::combining

@@ -66,4 +66,7 @@ void add_options(Command& command, const std::shared_ptr<Options>& options);
 /// UsageError for options that do not fit together, IoError for a folder that is not there: before the work, not after it.
 void check(const Options& options);
 
+/// IoError for a batch that is missing: before the others are read, where nothing keeps them.
+void require_batches(const Options& options);
+
 }  // namespace tool::combining
