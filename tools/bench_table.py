@@ -43,6 +43,7 @@ def rows():
     yield from medium_rows()
     yield from memory_rows()
     yield from estimator_rows()
+    yield from alone_rows()
     yield from fixed_rows()
     for law in ("pdf", "cdf"):
         yield Row(f"exact law, {law}, float", ("law", f"device/{law}"), peers={"host, one core, double": ("law", f"host/{law}")})
@@ -115,6 +116,13 @@ def estimator_rows():
                  "crossfit-regression"):
         yield Row(f"read out {name}, {power(LARGE)}", ("estimator", f"read_out/{name}/{LARGE}"),
                   ("estimator", f"limit/{LARGE}"), mix=("estimator", f"mix/{name}/{LARGE}"), at_least_of_mix=1 / 1.2, unit="bytes")
+
+
+def alone_rows():
+    """The estimate without its error."""
+    for name in ("ratio", "mickey"):
+        yield Row(f"read out {name} alone, {power(LARGE)}", ("estimator", f"alone/{name}/{LARGE}"),
+                  ("estimator", f"limit/{LARGE}"), mix=("estimator", f"mix_alone/{name}/{LARGE}"), at_least_of_mix=1 / 1.2, unit="bytes")
 
 
 def fixed_rows():

@@ -199,6 +199,13 @@ CLR_FN bool clr_asks_within(clr_question ask) {
            (ask.outputs & (CLR_WRITE_BIAS | CLR_WRITE_INTERVAL | CLR_WRITE_GAIN)) != 0;
 }
 
+// Whether any second moment is.
+CLR_FN bool clr_asks_scatter(clr_question ask) {
+    const bool corrects = ask.estimator == CLR_ESTIMATOR_BEALE || ask.estimator == CLR_ESTIMATOR_TIN;
+    const clr_u32 outputs = CLR_WRITE_ERROR | CLR_WRITE_BIAS | CLR_WRITE_INTERVAL | CLR_WRITE_GAIN | CLR_WRITE_NEEDED;
+    return clr_asks_within(ask) && (corrects || clr_is_regression(ask.estimator) || (ask.outputs & outputs) != 0);
+}
+
 // But for the sums over groups, the spread and the evidence.
 CLR_FN clr_joint clr_joint_means(clr_record all, clr_whole whole, clr_real tau, clr_u32 zero_policy) {
     clr_joint j;

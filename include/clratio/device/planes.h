@@ -137,10 +137,11 @@ CLR_FN bool clr_has_turn(uint plane, uint planes, uint pass, uint passes) {
 
 // The planes of an estimator: several are more streams than a processor fetches ahead by itself. i may lie past the end.
 CLR_FN void clr_prefetch_planes(clr_planes p, clr_state s, clr_question ask, uint pass, uint passes, ulong i) {
-    const bool mean = ask.estimator == CLR_ESTIMATOR_MEAN, ratios = clr_uses_ratios(ask.estimator);
-    const bool pair = !mean && ask.estimator != CLR_ESTIMATOR_MEAN_OF_RATIOS, within = pair && clr_asks_within(ask);
+    const bool mean = ask.estimator == CLR_ESTIMATOR_MEAN, averages = ask.estimator == CLR_ESTIMATOR_MEAN_OF_RATIOS;
+    const bool pair = !mean && !averages, scatter = !averages && clr_asks_scatter(ask), both = pair && scatter;
+    const bool ratios = clr_uses_ratios(ask.estimator), flags = (ask.outputs & (CLR_WRITE_FLAGS | CLR_COUNT_FLAGS)) != 0;
     global const float* planes[] = {p.m, p.t, p.mm, p.tt, p.mt, p.quotient, p.zero_m, p.zero_share};
-    const bool reads[] = {true, pair, mean || within, within, within, ratios, ratios, ratios};
+    const bool reads[] = {true, pair, scatter, both, both, ratios, averages, averages || (ratios && flags)};
     uint count = 0, plane = 0;
     CLR_UNROLL
     for (uint k = 0; k < 8; ++k) count += reads[k] ? 1 : 0;
