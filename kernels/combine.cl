@@ -208,8 +208,7 @@ CLR_FN clr_rest clr_rest_but(clr_planes base, const clr_groups* groups, uint but
 // From the beginning; where a slope is in doubt the other groups are asked.
 CLR_RARE_FN void clr_cross_again(clr_cross* to, clr_planes base, const clr_groups* groups, clr_whole whole, clr_real tau,
                                  clr_question ask, ulong i) {
-    const clr_joint j =
-        clr_join_groups(base, groups, whole, clr_evidence_of_group(groups->of[0], 0), tau, ask, i);
+    const clr_joint j = clr_join_groups(base, groups, whole, clr_evidence_of_group(groups->of[0], 0), tau, ask, i);
     clr_cross c = clr_cross_begin(j.folds, j.spread);
     for (uint g = 0; g < groups->count; ++g) {
         if (!clr_holds(groups, g)) continue;
