@@ -56,7 +56,7 @@ std::uint64_t bytes_of(const Shape& shape, std::uint64_t values) {
 }
 
 void check_bits(const char* name, int bits) {
-    if (bits < 0 || bits > 48) throw InvalidArgument(name, "0 to 48 bits", std::to_string(bits));
+    if (bits < 0 || bits > FixedOptions::most_bits) throw InvalidArgument(name, "0 to 48 bits", std::to_string(bits));
 }
 
 void check_options(FixedOptions o) {
@@ -64,8 +64,9 @@ void check_options(FixedOptions o) {
         throw InvalidArgument("nonfinite", "skip or fail, for a state of whole numbers", "propagate");
     check_bits("resolution", o.resolution);
     check_bits("range", o.range);
-    if (o.resolution + o.range < 16 || o.resolution + o.range > 48)
-        throw InvalidArgument("resolution + range", "16 to 48 bits", std::to_string(o.resolution + o.range));
+    const int bits = o.resolution + o.range;
+    if (bits < FixedOptions::least_bits || bits > FixedOptions::most_bits)
+        throw InvalidArgument("resolution + range", "16 to 48 bits", std::to_string(bits));
 }
 
 std::uint64_t whole_weight(double weight) {

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <iostream>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <numbers>
 #include <numeric>
 #include <sstream>
@@ -16,45 +15,17 @@
 #include "clratio/fit.hpp"
 #include "clratio/histogram.hpp"
 #include "clratio/law.hpp"
-#include "support/run.hpp"
-#include "support/scratch.hpp"
+#include "support/tool.hpp"
 
 using namespace clratio;
-using clratio::test::Said;
-using clratio::test::Scratch;
-using nlohmann::json;
+using namespace clratio::test;
 
 namespace {
-
-using Words = std::vector<std::string>;
-
-Words operator+(Words a, const Words& b) {
-    a.insert(a.end(), b.begin(), b.end());
-    return a;
-}
 
 const ErrorModel paper{.5, 1, .5, .35};
 const Words model{"errors", "--mu", ".5", "--tau", "1", "--sigma-m", ".5", "--sigma-t", ".35"};
 
-Said run(const Words& words, const clratio::test::Surroundings& around = {}) {
-    return clratio::test::run(CLRATIO_TOOL, words, around);
-}
-
-json counted(const Words& words) {
-    const Said said = run(model + words + Words{"--json"});
-    EXPECT_EQ(said.code, 0) << said.err;
-    EXPECT_EQ(said.err, "");
-    return json::parse(said.out, nullptr, false);
-}
-
-/// Exit code, one line on stderr with `part` in it, nothing on stdout.
-void expect_refused(const Words& words, int code, const std::string& part, const clratio::test::Surroundings& around = {}) {
-    const Said said = run(words, around);
-    EXPECT_EQ(said.code, code) << said.err;
-    EXPECT_EQ(said.out, "");
-    EXPECT_NE(said.err.find(part), std::string::npos) << "'" << part << "' is not in: " << said.err;
-    EXPECT_EQ(std::count(said.err.begin(), said.err.end(), '\n'), 1) << said.err;
-}
+json counted(const Words& words) { return answer(model + words); }
 
 std::vector<std::string> split(const std::string& text, char by) {
     std::vector<std::string> parts;
@@ -69,7 +40,7 @@ struct Csv {
     std::vector<std::vector<std::string>> rows;
 
     explicit Csv(const std::string& file) {
-        auto lines = split(clratio::test::bytes_of(file), '\n');
+        auto lines = split(bytes_of(file), '\n');
         if (lines.empty()) return;
         header = lines.front();
         for (std::size_t i = 1; i < lines.size(); ++i) rows.push_back(split(lines[i], ','));
@@ -83,7 +54,7 @@ struct Csv {
     }
 };
 
-std::vector<std::uint64_t> operator+(std::vector<std::uint64_t> a, const std::vector<std::uint64_t>& b) {
+std::vector<std::uint64_t> together(std::vector<std::uint64_t> a, const std::vector<std::uint64_t>& b) {
     EXPECT_EQ(a.size(), b.size());
     for (std::size_t i = 0; i < a.size(); ++i) a[i] += b[i];
     return a;
@@ -194,9 +165,9 @@ TEST(Errors, parts_add_up_to_the_whole) {
     const auto whole = counts_of({"--n", "1,2", "--count", "300000"});
     const auto first = counts_of({"--n", "1,2", "--count", "123457"});
     const auto rest = counts_of({"--n", "1,2", "--count", "176543", "--first", "123457"});
-    EXPECT_EQ(first + rest, whole);
+    EXPECT_EQ(together(first, rest), whole);
     const auto beside = counts_of({"--n", "1,2", "--count", "176543", "--first", "123458"});  // one draw late
-    EXPECT_NE(first + beside, whole);
+    EXPECT_NE(together(first, beside), whole);
     EXPECT_NE(counts_of({"--n", "1,2", "--count", "300000", "--seed", "2"}), whole);
     EXPECT_NE(counts_of({"--n", "1,2", "--count", "300000", "--rng", "pcg4d3x"}), whole);
 }
@@ -204,10 +175,10 @@ TEST(Errors, parts_add_up_to_the_whole) {
 TEST(Errors, draws_svg_and_png) {
     const Scratch scratch;
     counted({"--n", "1,4,16", "--count", "1e5", "--plot", scratch / "e.svg"});
-    EXPECT_TRUE(is_svg(clratio::test::bytes_of(scratch / "e.svg")));
+    EXPECT_TRUE(is_svg(bytes_of(scratch / "e.svg")));
     counted({"--count", "1e5", "--estimator", "mc", "--plot", scratch / "e.png"});
-    EXPECT_TRUE(is_png(clratio::test::bytes_of(scratch / "e.png")));
-    EXPECT_FALSE(is_png(clratio::test::bytes_of(scratch / "e.svg")));
+    EXPECT_TRUE(is_png(bytes_of(scratch / "e.png")));
+    EXPECT_FALSE(is_png(bytes_of(scratch / "e.svg")));
     EXPECT_EQ(scratch.files(), 2u) << "nothing else is left";
 }
 
@@ -215,14 +186,14 @@ TEST(Errors, no_shell_and_no_script_sees_a_file_name) {
     const Scratch scratch;
     const std::string name = "a';system \"touch hit\";'`touch hit`$(touch hit)\n.svg";
     counted({"--count", "1e5", "--plot", scratch / name});
-    EXPECT_TRUE(is_svg(clratio::test::bytes_of(scratch / name)));
+    EXPECT_TRUE(is_svg(bytes_of(scratch / name)));
     EXPECT_EQ(scratch.files(), 1u);
     EXPECT_FALSE(std::filesystem::exists("hit"));
 }
 
 TEST(Errors, without_gnuplot_the_package_is_named_before_the_work) {
     const Scratch scratch;
-    clratio::test::Surroundings empty;
+    Surroundings empty;
     empty.environment = {{"PATH", scratch / ""}};
     expect_refused(model + Words{"--count", "1e15", "--plot", scratch / "e.svg"}, 1, "gnuplot-nox", empty);
     expect_refused({"figures", "-o", scratch / "f", "--count", "1e15"}, 1, "gnuplot-nox", empty);
@@ -230,10 +201,9 @@ TEST(Errors, without_gnuplot_the_package_is_named_before_the_work) {
 
 TEST(Errors, a_gnuplot_that_fails_leaves_no_file) {
     const Scratch scratch, bin;
-    clratio::test::put_bytes(bin / "gnuplot",
-                             "#!/bin/sh\n[ \"$2\" = --version ] && exit 0\necho 'no such terminal' >&2\nexit 1\n");
+    put_bytes(bin / "gnuplot", "#!/bin/sh\n[ \"$2\" = --version ] && exit 0\necho 'no such terminal' >&2\nexit 1\n");
     std::filesystem::permissions(bin / "gnuplot", std::filesystem::perms::owner_all);
-    clratio::test::Surroundings broken;
+    Surroundings broken;
     broken.environment = {{"PATH", bin / ""}};
     expect_refused(model + Words{"--count", "1e5", "--plot", scratch / "e.svg"}, 1, "gnuplot: no such terminal", broken);
     EXPECT_EQ(scratch.files(), 0u);
@@ -265,7 +235,7 @@ TEST(Errors, bad_arguments_are_usage_errors) {
 
 TEST(Errors, a_full_disk_is_said_and_leaves_no_file) {
     const Scratch scratch;
-    clratio::test::Surroundings small;
+    Surroundings small;
     small.file_size_limit = 4096;
     counted({"--count", "1e5"});  // a program that is not built yet needs files of its own
     expect_refused(model + Words{"--count", "1e5", "--csv", scratch / "h.csv"}, 1, "h.csv: cannot be written", small);
@@ -305,14 +275,14 @@ TEST(Errors, shows_a_bar_and_ends_on_ctrl_c) {
 
 TEST(Figures, files_and_numbers) {
     const Scratch scratch;
-    const Said said = run({"figures", "-o", scratch / "new/folder", "--count", "1e5"});
+    const Said said = clratio_tool({"figures", "-o", scratch / "new/folder", "--count", "1e5"});
     ASSERT_EQ(said.code, 0) << said.err;
     EXPECT_EQ(said.err, "");
     for (const char* figure : {"figure1", "figure2"}) {
         const std::string stem = scratch / ("new/folder/" + std::string(figure));
-        EXPECT_TRUE(is_svg(clratio::test::bytes_of(stem + ".svg")));
-        EXPECT_TRUE(is_png(clratio::test::bytes_of(stem + ".png")));
-        EXPECT_NE(clratio::test::bytes_of(stem + ".svg").find("published eq. (22)"), std::string::npos);
+        EXPECT_TRUE(is_svg(bytes_of(stem + ".svg")));
+        EXPECT_TRUE(is_png(bytes_of(stem + ".png")));
+        EXPECT_NE(bytes_of(stem + ".svg").find("published eq. (22)"), std::string::npos);
     }
     const Csv samples(scratch / "new/folder/figure2.csv");
     EXPECT_EQ(samples.rows.size(), 14 * 303u);
@@ -320,7 +290,7 @@ TEST(Figures, files_and_numbers) {
     EXPECT_EQ(std::accumulate(counts.begin(), counts.end(), std::uint64_t{0}), 1'400'000u);
 
     // The peaks of theory, to three decimals; between two of 901 points a peak loses peak * N (step / 2)^2 / (2 * .28).
-    const auto rows = split(clratio::test::bytes_of(scratch / "new/folder/figure1.csv"), '\n');
+    const auto rows = split(bytes_of(scratch / "new/folder/figure1.csv"), '\n');
     EXPECT_EQ(rows.front(), "estimator,n,error,exact,published");
     std::map<std::string, double> peak, difference;
     for (std::size_t i = 1; i < rows.size(); ++i) {

@@ -324,12 +324,13 @@ TEST(Estimator, too_few_batches_fall_back_and_say_so) {
 
 TEST(Estimator, gain_of_a_constant_m_is_infinite_where_t_varies) {
     const Engine engine;
-    Moments s(engine, 3);
+    Moments s(engine, 4);
     for (const float x : {1.0f, 2.0f, 4.0f}) {
-        const std::vector<float> m{1, 1, x}, t{x, 1, 1};
+        const std::vector<float> m{1, 1, x, 0}, t{x, 1, 1, x};
         s.add(m, t);
     }
-    EXPECT_EQ(combine(s, 1.0f, {.gain = true}).gain, (std::vector<float>{std::numeric_limits<float>::infinity(), 1, 1}));
+    const float infinite = std::numeric_limits<float>::infinity();
+    EXPECT_EQ(combine(s, 1.0f, {.gain = true}).gain, (std::vector<float>{infinite, 1, 1, 1})) << "the last m is 0";
 }
 
 TEST(Estimator, no_residual_spread_is_flagged_with_an_interval_and_with_need) {
@@ -455,6 +456,9 @@ TEST(EstimatorSmall, every_estimator) {
         Moments s(Engine(options), 13, {.ratios = true, .groups = 2});
         for (std::size_t k = 0; k < 3; ++k) s.add(in.m[k], in.t[k]);
         for (const Estimator e : all_estimators()) EXPECT_EQ(combine(s, 1.0f, all_of(e)).estimate.size(), 13u);
+        Moments two(Engine(options), 13, {.groups = 2});  // neither slope is told by one batch: the others are asked
+        for (std::size_t k = 0; k < 2; ++k) two.add(in.m[k], in.t[k]);
+        EXPECT_EQ(combine(two, 1.0f, all_of(Estimator::crossfit_regression)).estimate.size(), 13u);
     }
 }
 

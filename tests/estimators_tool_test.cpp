@@ -2,23 +2,16 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <nlohmann/json.hpp>
 
-#include "support/run.hpp"
+#include "support/tool.hpp"
 
 using namespace clratio::test;
 
 namespace {
 
-nlohmann::json simulate(std::vector<std::string> more) {
-    std::vector<std::string> arguments{"estimators", "--json"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    const Said said = run(CLRATIO_TOOL, arguments);
-    EXPECT_EQ(said.code, 0) << said.err;
-    return nlohmann::json::parse(said.out);
-}
+json simulate(const Words& more) { return answer(Words{"estimators"} + more); }
 
-nlohmann::json cell(const nlohmann::json& result, const std::string& estimator, int n) {
+json cell(const json& result, const std::string& estimator, int n) {
     for (const auto& c : result.at("estimators").at(estimator))
         if (c.at("n") == n) return c;
     throw std::runtime_error("no cell " + estimator + " at " + std::to_string(n));
@@ -50,7 +43,7 @@ const std::vector<Known> model_a{{"mean", 4, 0, 1.63},
 
 /// How far a cell is from the table, in units of what rounding (half of the last digit printed, and of the table's own
 /// noise) and 5 standard errors allow.
-double excess(const nlohmann::json& result, const Known& k) {
+double excess(const json& result, const Known& k) {
     const auto c = cell(result, k.estimator, k.n);
     const double digit = std::fabs(k.bias) >= 1 ? .05 : .005;
     const auto one = [&](const char* name, double want, double rounding) {
@@ -102,7 +95,7 @@ TEST(EstimatorsTool, SlowTails_of_model_c) {
 }
 
 TEST(EstimatorsTool, misuse_is_refused) {
-    const Said said = run(CLRATIO_TOOL, {"estimators", "--models", "Z"});
+    const Said said = clratio_tool({"estimators", "--models", "Z"});
     EXPECT_EQ(said.code, 2);
     EXPECT_NE(said.err.find("--models"), std::string::npos) << said.err;
 }

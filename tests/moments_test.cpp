@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <boost/multiprecision/cpp_bin_float.hpp>
 #include <cmath>
 #include <limits>
 
@@ -323,6 +324,79 @@ std::vector<double> all_sums(const Moments& s) {
 }
 
 }  // namespace
+
+// ---- the residual m - r t, of which the error bar is made
+
+namespace {
+
+using Exact = boost::multiprecision::cpp_bin_float_100;
+using device::clr_entry;
+using device::clr_moments;
+
+Exact of(device::clr_two x) { return Exact(x.hi) + Exact(x.lo); }
+
+/// What the same entries make of m, t and their second moments without rounding.
+struct ExactMoments {
+    Exact m = 0, t = 0, mm = 0, tt = 0, mt = 0;
+    void add(float new_m, float new_t, clr_entry e) {
+        const Exact dm = new_m - m, dt = new_t - t;
+        mm += e.spread * dm * dm;
+        tt += e.spread * dt * dt;
+        mt += e.spread * dm * dt;
+        m += of(e.share) * dm;
+        t += of(e.share) * dt;
+    }
+};
+
+constexpr int short_sequence = 16;
+
+/// Of mm - 2 r mt + r^2 tt, with r as large as makes both parts count alike, of either sign: its error over what moments.h
+/// allows, 2^-24 of it, and over what the roundings of two-float cost: for each batch and moment fewer than 2^9 of 2^-48.
+double residual_error(const clr_moments& s, const ExactMoments& exact, int sign) {
+    const Exact r = sign * sqrt(exact.mm / exact.tt);
+    const Exact residual = exact.mm - 2 * r * exact.mt + r * r * exact.tt;
+    const Exact error = of(s.mm) - 2 * r * of(s.mt) + r * r * of(s.tt) - residual;
+    const Exact rounding = short_sequence * 0x1p-39 * 4 * exact.mm;
+    return std::abs(static_cast<double>(error / (0x1p-24 * residual + rounding)));
+}
+
+/// The largest over many sequences in which m is `noise` away from t, or, where `crossed`, from t or -t.
+template <class Add> double worst_residual_error(std::uint64_t seed, bool crossed, float noise, Add add) {
+    Samples draw(seed);
+    double worst = 0;
+    for (int sequence = 0; sequence < 4000; ++sequence) {
+        clr_moments s = device::clr_moments_none();
+        ExactMoments exact;
+        for (int k = 0; k < short_sequence; ++k) {
+            const float count = static_cast<float>(k);
+            const clr_entry e = device::clr_entry_make({count, 0}, {1, 0}, {count + 1, 0});
+            const float t = static_cast<float>(draw.normal() * draw.lognormal(1));
+            const float m = (crossed && draw.uniform() < .5 ? -t : t) + noise * static_cast<float>(draw.normal());
+            s = add(s, m, t, e, static_cast<device::clr_u32>(k));
+            exact.add(m, t, e);
+        }
+        for (const int sign : {-1, 1}) worst = std::max(worst, residual_error(s, exact, sign));
+    }
+    return worst;
+}
+
+/// As clr_moments_add, but what the sum of mt and a product loses is forgotten.
+clr_moments add_carelessly(clr_moments s, float m, float t, clr_entry e, device::clr_u32 index) {
+    const float product = e.spread * (m - s.m.hi) * (t - s.t.hi);
+    const float lost = device::clr_two_sum(s.mt.hi, product).lo;
+    s = device::clr_moments_add(s, m, t, e, index);
+    s.mt.lo -= lost;
+    return s;
+}
+
+}  // namespace
+
+TEST(Moments, the_residual_keeps_its_digits) {
+    const float near = 0x1p-8f;
+    EXPECT_LT(worst_residual_error(11, false, near, device::clr_moments_add), 1);
+    EXPECT_LT(worst_residual_error(12, true, 0, device::clr_moments_add), 1);
+    EXPECT_GT(worst_residual_error(11, false, near, add_carelessly), 10) << "planted fault";
+}
 
 TEST(Moments, an_empty_state_is_zero_whatever_its_planes_hold) {
     const Engine engine;

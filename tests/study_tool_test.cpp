@@ -16,15 +16,6 @@ using namespace clratio::test;
 
 namespace {
 
-/// Exit code, one line on stderr with `part` in it, nothing on stdout.
-void expect_refused(const Words& words, int code, const std::string& part) {
-    const Said said = run(words);
-    EXPECT_EQ(said.code, code) << said.err;
-    EXPECT_EQ(said.out, "");
-    EXPECT_NE(said.err.find(part), std::string::npos) << "'" << part << "' is not in: " << said.err;
-    EXPECT_EQ(std::count(said.err.begin(), said.err.end(), '\n'), 1) << said.err;
-}
-
 /// Two pieces for each of 15 series.
 const Words small{"study", "--scenes", "spheres", "--size", "12x9", "--seeds", "18", "--no-report"};
 constexpr int pieces = 30;
@@ -112,7 +103,7 @@ TEST(Study, goes_on_after_being_killed_at_any_moment) {
     int killed = 0;
     for (int i = 0; i < 6; ++i) {
         const auto moment = std::chrono::milliseconds(100 + random() % 900);
-        killed += run(words, {.signal = SIGKILL, .wait = [=] { std::this_thread::sleep_for(moment); }}).code == 137;
+        killed += clratio_tool(words, {.signal = SIGKILL, .wait = [=] { std::this_thread::sleep_for(moment); }}).code == 137;
     }
     answer(words);
     EXPECT_GT(killed, 0);
@@ -127,7 +118,7 @@ TEST(Study, stops_politely_and_says_how_to_go_on) {
         for (int i = 0; i < 3000 && !std::filesystem::exists(scratch / "s/parts/louvres_uni_iid_100x75_seeds0-15.sums"); ++i)
             std::this_thread::sleep_for(std::chrono::milliseconds(10));
     };
-    const Said said = run(words, {.signal = SIGINT, .wait = first_part});
+    const Said said = clratio_tool(words, {.signal = SIGINT, .wait = first_part});
     EXPECT_EQ(said.code, 130) << said.err;
     EXPECT_NE(said.err.find("the same command goes on from there"), std::string::npos) << said.err;
 }
@@ -307,10 +298,10 @@ TEST(Study, parts_have_their_times_in_a_file_of_their_own) {
     Words with_report = small;
     with_report.pop_back();
     put_bytes(a + "/times.jsonl", bytes_of(a + "/times.jsonl") + "{broken\n");
-    EXPECT_EQ(run(with_report + Words{"--merge", a, "-o", b}).code, 0);
+    EXPECT_EQ(clratio_tool(with_report + Words{"--merge", a, "-o", b}).code, 0);
     EXPECT_EQ(lines(b).size(), 15u);
     EXPECT_NE(bytes_of(b + "/report.html").find("15 of 30 parts"), std::string::npos);
-    EXPECT_EQ(run(with_report + Words{"-o", a}).code, 0);
+    EXPECT_EQ(clratio_tool(with_report + Words{"-o", a}).code, 0);
     EXPECT_NE(bytes_of(a + "/report.html").find("30 of 30 parts"), std::string::npos);
     EXPECT_EQ(Csv(a), whole());
 }
@@ -319,7 +310,7 @@ TEST(Study, report_stands_alone) {
     const Scratch scratch;
     const Words words{"study",   "--scenes", "spheres,window", "--size", "24x18",
                       "--seeds", "2",        "--quick",        "-o",     scratch / "s"};
-    EXPECT_EQ(run(words).code, 0);
+    EXPECT_EQ(clratio_tool(words).code, 0);
     const std::string html = bytes_of(scratch / "s/report.html");
     EXPECT_GT(html.size(), 200000u);
     EXPECT_LT(html.size(), 6000000u);

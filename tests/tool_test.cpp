@@ -6,33 +6,17 @@
 
 #include <cmath>
 #include <limits>
-#include <nlohmann/json.hpp>
 
 #include "clratio/image.hpp"
 #include "support/exr.hpp"
-#include "support/run.hpp"
-#include "support/scratch.hpp"
+#include "support/tool.hpp"
 
 using namespace clratio;
-using clratio::test::bytes_of;
-using clratio::test::Said;
-using clratio::test::Scratch;
-using nlohmann::json;
+using namespace clratio::test;
 
 namespace {
 
 const std::string cycles = CLRATIO_TEST_DATA "/cycles/";
-
-using Words = std::vector<std::string>;
-
-Words operator+(Words a, const Words& b) {
-    a.insert(a.end(), b.begin(), b.end());
-    return a;
-}
-
-Said clratio_tool(const Words& words, const clratio::test::Surroundings& around = {}) {
-    return clratio::test::run(CLRATIO_TOOL, words, around);
-}
 
 Words files(const std::string& scene, const char* kind, int count) {
     Words all;
@@ -45,28 +29,6 @@ Words pairs(const std::string& scene, int count) {
 }
 
 std::string reference(const std::string& scene, const char* kind) { return cycles + scene + "/" + kind + "_ref.exr"; }
-
-/// Combines and returns the JSON; nothing may stand on stderr.
-json combined(const Words& words) {
-    const Said said = clratio_tool(words + Words{"--json"});
-    EXPECT_EQ(said.code, 0) << said.err;
-    EXPECT_EQ(said.err, "");
-    return json::parse(said.out, nullptr, false);
-}
-
-void expect_in(const std::string& part, const std::string& text) {
-    EXPECT_NE(text.find(part), std::string::npos) << "'" << part << "' is not in: " << text;
-}
-
-/// The named exit code, `part` in one line on stderr, nothing on stdout.
-void expect_refused(const Words& words, int code, const std::string& part, const clratio::test::Surroundings& around = {}) {
-    const Said said = clratio_tool(words, around);
-    EXPECT_EQ(said.code, code) << said.err;
-    EXPECT_EQ(said.out, "");
-    expect_in(part, said.err);
-    EXPECT_EQ(std::count(said.err.begin(), said.err.end(), '\n'), 1) << said.err;
-    EXPECT_EQ(said.err.rfind("clratio: ", 0), 0u) << said.err;
-}
 
 Image made(int width, int height, float value) {
     Image image;
@@ -107,9 +69,9 @@ const std::map<std::string, std::vector<Row>> tables{
 
 json scene_scores(const std::string& scene, int batches, const Words& more) {
     const Scratch scratch;
-    return combined(pairs(scene, batches) +
-                    Words{"--tau", reference(scene, "t"), "--reference", reference(scene, "m"), "-o", scratch / "o.exr"} +
-                    more);
+    return answer(pairs(scene, batches) +
+                  Words{"--tau", reference(scene, "t"), "--reference", reference(scene, "m"), "-o", scratch / "o.exr"} +
+                  more);
 }
 
 }  // namespace
@@ -149,13 +111,13 @@ TEST(Tool, json_has_every_field) {
     for (const char* name : {"decode", "device", "encode"}) EXPECT_TRUE(j["seconds"][name].is_number_float()) << name;
     for (const char* name : {"rmse", "bias", "rmse_mean", "bias_mean"}) EXPECT_TRUE(j[name].is_number_float()) << name;
     const Scratch scratch;
-    EXPECT_FALSE(combined(pairs("area", 1) + Words{"--tau", "1", "-o", scratch / "o.exr"}).contains("rmse"));
+    EXPECT_FALSE(answer(pairs("area", 1) + Words{"--tau", "1", "-o", scratch / "o.exr"}).contains("rmse"));
 }
 
 TEST(Tool, the_multilayer_pair_combines_without_conversion) {
     const Scratch scratch;
     const std::string out = scratch / "o.exr", tau = reference("multilayer", "t");
-    combined(pairs("multilayer", 2) + Words{"--tau", tau, "--zero", "zero", "-o", out});
+    answer(pairs("multilayer", 2) + Words{"--tau", tau, "--zero", "zero", "-o", out});
     const Image image = read_image(out), first = read_image(files("multilayer", "m", 1)[0]);
     const auto want = ratio_in_double(files("multilayer", "m", 2), files("multilayer", "t", 2), read_image(tau));
     double worst = 0;
@@ -173,15 +135,15 @@ TEST(Tool, layers_are_named_for_one_file_or_for_all) {
     clratio::test::write_exr(scratch / "x.exr", {{.channels = layers}});
     const std::string x = scratch / "x.exr", out = scratch / "o.exr";
     expect_refused({"combine", "--m", x, "--t", x, "--tau", "1", "-o", out}, 1, x + ": several layers and none named");
-    combined({"combine", "--m", x, "--t", x + ":b", "--tau", x, "-o", out, "--layer", "a"});
+    answer({"combine", "--m", x, "--t", x + ":b", "--tau", x, "-o", out, "--layer", "a"});
     expect_refused({"combine", "--m", x, "--t", x, "--tau", x + ":c", "-o", out, "--layer", "a"}, 1,
                    x + ":c: no such layer");
 }
 
 TEST(Tool, writes_settings_and_metadata) {
     const Scratch scratch;
-    combined(pairs("area", 2) +
-             Words{"--tau", "1", "2", "3", "--zero", "one", "--nonfinite", "propagate", "-o", scratch / "o.exr"});
+    answer(pairs("area", 2) +
+           Words{"--tau", "1", "2", "3", "--zero", "one", "--nonfinite", "propagate", "-o", scratch / "o.exr"});
     Imf::MultiPartInputFile file((scratch / "o.exr").c_str());
     const auto text = [&](const char* name) { return file.header(0).typedAttribute<Imf::StringAttribute>(name).value(); };
     EXPECT_EQ(text("clratio/estimator"), "ratio");
@@ -191,8 +153,8 @@ TEST(Tool, writes_settings_and_metadata) {
     EXPECT_EQ(text("clratio/tau"), "1 2 3");
     EXPECT_EQ(text("Camera"), "Camera");
 
-    combined(pairs("area", 2) + Words{"--tau", "1", "--weight", "1", "3", "--interval", ".9", "--groups", "2", "-o",
-                                      scratch / "w.exr", "--upper", scratch / "u.exr"});
+    answer(pairs("area", 2) + Words{"--tau", "1", "--weight", "1", "3", "--interval", ".9", "--groups", "2", "-o",
+                                    scratch / "w.exr", "--upper", scratch / "u.exr"});
     Imf::MultiPartInputFile upper((scratch / "u.exr").c_str());
     const auto said = [&](const char* name) { return upper.header(0).typedAttribute<Imf::StringAttribute>(name).value(); };
     EXPECT_EQ(said("clratio/weight"), "1 3");
@@ -209,8 +171,7 @@ TEST(Tool, tau_is_a_number_one_a_channel_or_the_mean_of_files) {
     write_image(scratch / "1.exr", made(5, 4, 1));
     write_image(scratch / "4.exr", made(5, 4, 4));
     const auto first_pixel = [&](const Words& tau) {
-        combined(Words{"combine", "--m", scratch / "m.exr", "--t", scratch / "t.exr", "-o", scratch / "o.exr", "--tau"} +
-                 tau);
+        answer(Words{"combine", "--m", scratch / "m.exr", "--t", scratch / "t.exr", "-o", scratch / "o.exr", "--tau"} + tau);
         const Image image = read_image(scratch / "o.exr");
         return std::vector<float>(image.values.begin(), image.values.begin() + 3);
     };
@@ -234,13 +195,13 @@ TEST(Tool, several_bands_give_the_bits_of_one) {
     for (int k = 0; k < 10; ++k) words.push_back(file(k % 2));
     words.push_back("--t");
     for (int k = 0; k < 10; ++k) words.push_back(file(2 + k % 2));
-    const json j = combined(words);
+    const json j = answer(words);
     EXPECT_EQ(read_image(scratch / "o.exr").values, want.estimate);
     EXPECT_EQ(j["flags"]["any"], want.flags.any);
 
     Moments two{Engine{}, images[0].size()};
     for (int k = 0; k < 2; ++k) two.add(images[k], images[2 + k]);
-    combined({"combine", "--tau", "1", "2", "3", "-o", scratch / "o.exr", "--m", file(0), file(1), "--t", file(2), file(3)});
+    answer({"combine", "--tau", "1", "2", "3", "-o", scratch / "o.exr", "--m", file(0), file(1), "--t", file(2), file(3)});
     EXPECT_EQ(read_image(scratch / "o.exr").values, combine(two, Tau(std::vector<float>{1, 2, 3})).estimate);
 }
 
@@ -252,7 +213,7 @@ TEST(Tool, zero_denominators_follow_the_policy_are_flagged_and_can_fail_the_run)
     write_image(scratch / "t.exr", t);
     const Words words{"combine", "--m", scratch / "m.exr", "--t", scratch / "t.exr", "--tau", "4", "-o", scratch / "o.exr"};
     for (const auto& [policy, value] : std::map<std::string, float>{{"mc-mean", 3}, {"zero", 0}, {"one", 4}}) {
-        const json j = combined(words + Words{"--zero", policy, "--flags", scratch / "f.exr"});
+        const json j = answer(words + Words{"--zero", policy, "--flags", scratch / "f.exr"});
         EXPECT_EQ(j["flags"]["zero_denominator"], 1);
         const Image out = read_image(scratch / "o.exr"), flags = read_image(scratch / "f.exr");
         EXPECT_EQ(out.values[7], value);
@@ -280,9 +241,9 @@ TEST(Tool, nonfinite_inputs_follow_the_policy) {
     const Words words{
         "combine", "--m", scratch / "bad.exr", scratch / "m.exr", "--t", scratch / "t.exr", scratch / "t.exr", "--tau",
         "4",       "-o",  scratch / "o.exr"};
-    EXPECT_EQ(combined(words)["flags"]["skipped"], 1);
+    EXPECT_EQ(answer(words)["flags"]["skipped"], 1);
     EXPECT_EQ(read_image(scratch / "o.exr").values[22], 6);
-    EXPECT_EQ(combined(words + Words{"--nonfinite", "propagate"})["flags"]["nonfinite"], 1);
+    EXPECT_EQ(answer(words + Words{"--nonfinite", "propagate"})["flags"]["nonfinite"], 1);
     EXPECT_TRUE(std::isnan(read_image(scratch / "o.exr").values[22]));
     std::filesystem::remove(scratch / "o.exr");
     expect_refused(words + Words{"--nonfinite", "fail"}, 1, scratch / "bad.exr" + ": nan at column 2, row 1, channel G");
@@ -349,7 +310,7 @@ TEST(Tool, outputs_replace_neither_inputs_nor_each_other_nor_a_state) {
     std::filesystem::copy(files("area", "m", 1)[0], m);
     std::filesystem::copy(files("area", "t", 1)[0], t);
     const Words batch{"combine", "--m", m, "--t", t, "--tau", "1"};
-    combined(Words{"combine", "--m", m, "--t", t, "--state", state});
+    answer(Words{"combine", "--m", m, "--t", t, "--state", state});
     const std::string old = bytes_of(m), sums = bytes_of(state);
     expect_refused(batch + Words{"-o", scratch / "./m.exr"}, 2, "an input, and an output");
     expect_refused(batch + Words{"-o", o, "--flags", t}, 2, "an input, and an output");
@@ -423,7 +384,7 @@ TEST(Tool, a_full_disk_exits_1_and_keeps_the_old_file) {
     const Scratch scratch;
     const std::string out = scratch / "o.exr";
     const Words words = pairs("area", 1) + Words{"--tau", "1", "-o", out};
-    combined(words);
+    answer(words);
     const std::string old = clratio::test::bytes_of(out);
     expect_refused(words, 1, out + ": cannot be written: File too large", {.file_size_limit = old.size() - 1});
     EXPECT_EQ(clratio::test::bytes_of(out), old);
@@ -491,21 +452,9 @@ TEST(Tool, need_where_all_batches_agree_is_flagged_and_counted) {
         write_image(scratch / (std::to_string(k) + "m.exr"), m);
         write_image(scratch / (std::to_string(k) + "t.exr"), made(4, 1, 2));
     }
-    const Words combine{"combine",
-                        "--m",
-                        scratch / "0m.exr",
-                        scratch / "1m.exr",
-                        "--t",
-                        scratch / "0t.exr",
-                        scratch / "1t.exr",
-                        "--tau",
-                        "2",
-                        "-o",
-                        scratch / "o.exr",
-                        "--needed",
-                        scratch / "n.exr",
-                        "--target",
-                        ".1"};
+    const Words m{"combine", "--m", scratch / "0m.exr", scratch / "1m.exr"};
+    const Words t{"--t", scratch / "0t.exr", scratch / "1t.exr", "--tau", "2", "-o", scratch / "o.exr"};
+    const Words combine = m + t + Words{"--needed", scratch / "n.exr", "--target", ".1"};
     expect_in("11  all batches agree", clratio_tool(combine).out);
     const json j = json::parse(clratio_tool(combine + Words{"--json", "--fail-on-flag"}).out);
     EXPECT_EQ(j["flags"]["no_spread"], 11);

@@ -51,7 +51,7 @@ struct Combined {
     std::vector<float> bias;          ///< estimated E[ratio] - truth; +inf where it is not known
     std::vector<float> lower, upper;  ///< of the confidence interval
     std::vector<std::uint32_t> kind;  ///< IntervalKind of each value
-    std::vector<float> gain;          ///< +inf where t varies and m does not, 1 where neither does
+    std::vector<float> gain;          ///< +inf where only t varies; 1 where the ratio does not either
     std::vector<float> needed;        ///< 0: the target is met; +inf where nothing is known
     std::uint64_t negatives = 0;      ///< negative inputs that combine_batches has read
 };

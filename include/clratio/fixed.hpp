@@ -12,8 +12,9 @@ namespace clratio {
 
 struct Snapshot;
 
-/// resolution + range is at least 16, so that Moments hold the weight exactly, and at most 48.
 struct FixedOptions {
+    /// Of resolution + range: 16, so that Moments hold the weight exactly, to 48.
+    static constexpr int least_bits = 16, most_bits = 48;
     /// What a value does that fixed point cannot hold: NaN, infinite, or outside the range. skip or fail, as with Moments.
     NonFinite nonfinite = NonFinite::skip;
     /// Values are kept to the nearest multiple of 2^-resolution, ties to even: 0 to 48. 24 keeps every float16, and every

@@ -5,32 +5,11 @@
 
 #include <cmath>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <sstream>
-#include <string>
-#include <vector>
 
-#include "support/run.hpp"
-#include "support/scratch.hpp"
+#include "support/tool.hpp"
 
 namespace clratio::test {
-
-using nlohmann::json;
-using Words = std::vector<std::string>;
-
-inline Words operator+(Words a, const Words& b) {
-    a.insert(a.end(), b.begin(), b.end());
-    return a;
-}
-
-inline Said run(const Words& words, const Surroundings& around = {}) { return run(CLRATIO_TOOL, words, around); }
-
-inline json answer(const Words& words) {
-    const Said said = run(words + Words{"--json"});
-    EXPECT_EQ(said.code, 0) << said.err;
-    EXPECT_EQ(said.err, "");
-    return json::parse(said.out, nullptr, false);
-}
 
 struct Csv {
     std::string errors, densities, chords, averages;

@@ -43,7 +43,7 @@ Files: half, float or uint EXR; scanline, tiled or multi-part; all of one size, 
 layer in one file, --layer one for all; with one colour layer in the file it is found without asking. Alpha is taken
 from the first file of --m. The output is float, ZIP, with the windows and attributes of that file and the settings used.
 --flags: a UINT for each value; 1 mean t is 0, 2 tau is 0, 4 batch skipped, 8 no data, 16 no error bar, 32 not finite,
-64 too few batches for the estimator, 128 (with --interval or --needed) the batches agree exactly.
+64 too few batches or groups, or others that do not vary, 128 (with --interval or --needed) the batches agree exactly.
 --stderr: the standard error by the delta method (jackknife: its own); +inf with one batch (a regression: two). Without it
 a missing error bar is no flag that --fail-on-flag looks at. hartley-ross and mean-of-ratios: 1 where t of some batch is 0.
 
@@ -219,9 +219,11 @@ void require_fixed(const Options& options) {
           {"--weights reliability", options.weights == "reliability"},
           {"--nonfinite propagate", options.nonfinite == "propagate"}})
         if (given) throw UsageError(option + ": not with --fixed, which keeps the sums of single values alone");
-    const std::uint32_t bits = *options.fixed + options.range.value_or(16);
-    if (bits < 16 || bits > 48)
-        throw UsageError(fmt::format("--fixed and --range: expected 16 to 48 bits together, got {}", bits));
+    const auto sums = *options.sums().fixed;
+    const int bits = sums.resolution + sums.range;
+    if (bits < sums.least_bits || bits > sums.most_bits)
+        throw UsageError(fmt::format("--fixed and --range: expected {} to {} bits together, got {}", sums.least_bits,
+                                     sums.most_bits, bits));
     for (const double w : options.weight)
         if (w != std::floor(w) || w < 1)
             throw UsageError(fmt::format("--weight: with --fixed whole numbers from 1 on, got {}", w));
@@ -323,10 +325,10 @@ void add_options(Command& command, const std::shared_ptr<Options>& o) {
     const auto fixed =
         command.option("--fixed", o->fixed, "Sums of whole numbers: values to the nearest multiple of 2^-Q, 24 is usual")
             .type("Q")
-            .within(0, 48);
+            .within(0, clratio::FixedOptions::most_bits);
     command.option("--range", o->range, "With --fixed: values up to 2^R (16); larger ones count as not finite")
         .type("R")
-        .within(0, 48)
+        .within(0, clratio::FixedOptions::most_bits)
         .needs(fixed);
     const auto interval = command.option("--interval", o->interval, "A confidence interval of this level").type("LEVEL");
     choice("--method", o->method, methods, "How the interval is made").needs(interval);

@@ -44,8 +44,7 @@ private:
             const std::uint64_t index = options_.first_batch + job.index;
             if (run_.holds(index)) continue;
             auto pair = read(job, index);
-            if (!pair) continue;
-            run_.fit(*pair);
+            if (!pair || !fits(*pair, job)) continue;
             pairs.push_back(std::move(*pair));
             if (pairs.size() >= std::min<std::uint64_t>(wanted(), pairs_in_a_launch(pairs.front().m))) break;
         }
@@ -55,21 +54,37 @@ private:
         return true;
     }
 
-    // A file that stands still but does not open may be half of one whose renderer died, or waits; one that is not like the
-    // others may be of another render. They are looked at again when they have changed.
+    // A file that stands still but does not open may be half of one whose renderer died, or waits.
     std::optional<Pair> read(const Job& job, std::uint64_t index) {
         const auto start = std::chrono::steady_clock::now();
         try {
             Pair pair{index, clratio::read_image(job.m, options_.layer), clratio::read_image(job.t, options_.layer)};
             seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-            if (run_.is_begun()) run_.fit(pair);
             return pair;
-        } catch (const clratio::Error& e) {
-            folder_.put_off(job);
-            line_.clear();
-            fmt::print(stderr, "clratio: waiting for another version of {}\n", e.what());
+        } catch (const clratio::IoError& e) {
+            put_off(job, e.what());
             return std::nullopt;
         }
+    }
+
+    // One of another size may be of another render. The first, which nothing has to be like yet, must fit tau.
+    bool fits(const Pair& pair, const Job& job) {
+        const bool is_first = !run_.is_begun();
+        try {
+            run_.fit(pair);
+            return true;
+        } catch (const clratio::InvalidArgument& e) {
+            if (is_first) throw;
+            put_off(job, e.what());
+            return false;
+        }
+    }
+
+    // Until it has changed.
+    void put_off(const Job& job, const std::string& why) {
+        folder_.put_off(job);
+        line_.clear();
+        fmt::print(stderr, "clratio: waiting for another version of {}\n", why);
     }
 
     void refresh() {

@@ -288,7 +288,7 @@ CLR_FN clr_real clr_error_of(clr_joint j, clr_mask fallen, clr_u32 estimator) {
     return by_delta ? clr_delta_error(q, s, n) : error;
 }
 
-// 1 where neither varies.
+// 1 where neither the ratio nor the mean varies.
 CLR_FN clr_real clr_gain_of(clr_spread s) {
     const clr_real zero = (clr_real)(0.0f), one = (clr_real)(1.0f), residual = clr_abs(s.ratio.mm);
     const clr_mask flat = !(s.mm > zero);

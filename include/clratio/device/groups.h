@@ -193,8 +193,8 @@ CLR_FN clr_cross clr_cross_begin(clr_folds f, clr_spread all) {
     return c;
 }
 
-// What a group's part leaves of the sums over all. Unless a margin is negative, the slope is good to (groups + 2) 2^-14 of
-// the root of mm over tt.
+// What a group's part leaves of the sums over all. Unless a margin is negative, the slope without a group of up to half of
+// the weight is good to (groups + 2) 2^-14 of the root of mm over tt.
 typedef struct {
     clr_real slope;
     clr_real margin_m, margin_t;  // by which mm and tt are more than the least
