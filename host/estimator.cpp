@@ -136,11 +136,11 @@ double Statistics::scale(bool reliability) const {
     return reliability ? weight2 / (weight * (weight * weight - weight2)) : 1 / ((batches - 1) * weight);
 }
 
-double estimate(std::span<const Statistics> groups, Estimator estimator, double tau) {
+double estimate(std::span<const Statistics> groups, Estimator estimator, double tau, bool reliability) {
     const Statistics s = sum_of(groups);
     const Needs needs = needs_of(estimator);
     if (s.batches < needs.batches || (needs.groups && filled(groups) < 2)) return not_known;
-    const double n = s.scale(), r = ratio(s);
+    const double n = s.scale(reliability), r = ratio(s);
     switch (estimator) {
     case Estimator::ratio:
         return tau * r;
@@ -178,19 +178,20 @@ double standard_error(std::span<const Statistics> groups, Estimator estimator, d
     return std::fabs(tau / s.mean_t) * std::sqrt(std::max(0.0, residual(s, ratio(s))) * n);
 }
 
-double bias_of_ratio(const Statistics& s, double tau) {
-    return tau * (ratio(s) * s.m2_t - s.c_mt) * s.scale() / (s.mean_t * s.mean_t);
+double bias_of_ratio(const Statistics& s, double tau, bool reliability) {
+    return tau * (ratio(s) * s.m2_t - s.c_mt) * s.scale(reliability) / (s.mean_t * s.mean_t);
 }
 
-Interval delta_interval(const Statistics& s, double tau, double quantile) {
-    const double value = tau * ratio(s), width = quantile * standard_error(std::span(&s, 1), Estimator::ratio, tau);
+Interval delta_interval(const Statistics& s, double tau, double quantile, bool reliability) {
+    const double value = tau * ratio(s), error = standard_error(std::span(&s, 1), Estimator::ratio, tau, reliability),
+                 width = quantile * error;
     if (!std::isfinite(width)) return {-infinite, infinite, IntervalKind::whole_line};
     return {value - width, value + width, IntervalKind::bounded};
 }
 
 // a x^2 - 2 b x + c <= 0 with the discriminant from residual variances, which do not cancel.
-Interval fieller_interval(const Statistics& s, double tau, double quantile) {
-    const double n = s.scale(), q2 = quantile * quantile, vm = s.m2_m * n, vt = s.m2_t * n, cov = s.c_mt * n;
+Interval fieller_interval(const Statistics& s, double tau, double quantile, bool reliability) {
+    const double n = s.scale(reliability), q2 = quantile * quantile, vm = s.m2_m * n, vt = s.m2_t * n, cov = s.c_mt * n;
     const double a = s.mean_t * s.mean_t - q2 * vt, b = s.mean_m * s.mean_t - q2 * cov;
     const double square = q2 * (s.mean_t * s.mean_t * residual(s, ratio(s)) * n - q2 * (vm * vt - cov * cov));
     if (s.batches < 2 || (a <= 0 && square <= 0)) return {-infinite, infinite, IntervalKind::whole_line};

@@ -26,14 +26,6 @@ void carry_metadata(const Image::Metadata& from, Imf::Header& to) {
         if (not_carried.count(a.name()) == 0) to.insert(a.name(), a.attribute());
 }
 
-fs::path output_target(const fs::path& path) {
-    const auto status = fs::status(path);
-    if (fs::exists(status) && !fs::is_regular_file(status)) throw std::runtime_error("exists and is not a regular file");
-    if (fs::exists(status)) return fs::canonical(path);
-    const bool leads_nowhere = fs::is_symlink(fs::symlink_status(path));
-    return leads_nowhere ? output_target(path.parent_path() / fs::read_symlink(path)) : path;
-}
-
 void require_channels(const Image& image) {
     const std::set<std::string> unique(image.channels.begin(), image.channels.end());
     if (unique.empty() || unique.size() != image.channels.size() || unique.count("") != 0)

@@ -4,7 +4,6 @@
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 
-#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -31,9 +30,6 @@ inline void add_slices(Imf::FrameBuffer& frame, const std::vector<std::string>& 
 
 /// Adds the attributes that describe the picture, not the layout of the file it was read from.
 void carry_metadata(const Image::Metadata& from, Imf::Header& to);
-
-/// Where a file written as `path` goes: links are followed. Throws std::runtime_error where what stands there is no file.
-std::filesystem::path output_target(const std::filesystem::path& path);
 
 /// Throws InvalidArgument unless the image has channels of different names and at least one pixel.
 void require_channels(const Image& image);

@@ -8,6 +8,7 @@
 
 #include "exr_file.hpp"
 #include "exr_stream.hpp"
+#include "output_target.hpp"
 
 namespace clratio {
 namespace {

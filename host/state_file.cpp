@@ -14,6 +14,7 @@
 #include "clratio/state.hpp"
 #include "exr_file.hpp"
 #include "exr_stream.hpp"
+#include "output_target.hpp"
 
 namespace clratio {
 namespace {

@@ -158,17 +158,24 @@ CombineOptions all_of(Estimator e, IntervalMethod method = IntervalMethod::fiell
     return o;
 }
 
+MomentsOptions with_weights(bool reliability) {
+    MomentsOptions o = everything;
+    if (reliability) o.weights = Weights::reliability;
+    return o;
+}
+
 /// The largest |got - want| / scale over all values, where scale is of the size of the estimate and its parts.
 struct Worst {
     double value = 0, error = 0;
 };
 
-Worst worst_of(const GroupedInput& in, const Combined& out, Estimator e, Estimator oracle) {
+Worst worst_of(const GroupedInput& in, const Combined& out, Estimator e, Estimator oracle, bool reliability) {
     Worst worst;
     for (std::size_t i = 0; i < values; ++i) {
         const auto groups = reference(in, i);
         const double tau = static_cast<double>(taus[i]);
-        const double want = estimate(groups, oracle, tau), error = standard_error(groups, oracle, tau);
+        const double want = estimate(groups, oracle, tau, reliability);
+        const double error = standard_error(groups, oracle, tau, reliability);
         const double size =
             std::fabs(estimate(groups, Estimator::ratio, tau)) + 8 * standard_error(groups, Estimator::ratio, tau);
         worst.value = std::max(worst.value, std::fabs(static_cast<double>(out.estimate[i]) - want) / size);
@@ -184,17 +191,24 @@ Worst worst_of(const GroupedInput& in, const Combined& out, Estimator e, Estimat
 // each. Errors are roots of differences of second moments in two-float, then five float operations: 4 ulp.
 TEST(Estimator, device_matches_the_reference_in_double) {
     const Engine engine;
-    for (const std::uint64_t seed : {1, 2, 3}) {
+    for (const std::uint64_t seed : {1, 2, 3, 4}) {
+        const bool reliability = seed == 4;
         const GroupedInput in = input_of(seed);
-        const Moments s = moments_of(engine, in, everything);
+        const Moments s = moments_of(engine, in, with_weights(reliability));
         for (const Estimator e : all_estimators()) {
             const Combined out = combine(s, Tau(std::span<const float>(taus)), all_of(e));
-            const Worst worst = worst_of(in, out, e, e);
+            const Worst worst = worst_of(in, out, e, e, reliability);
             EXPECT_LE(worst.value, 12 * 0x1p-24) << name_of(e) << " seed " << seed;
             EXPECT_LE(worst.error, 8 * 0x1p-24) << name_of(e) << " seed " << seed;
             if (e == Estimator::ratio) continue;
-            EXPECT_GT(worst_of(in, out, e, Estimator::ratio).value, 12 * 0x1p-24)
+            EXPECT_GT(worst_of(in, out, e, Estimator::ratio, reliability).value, 12 * 0x1p-24)
                 << "planted fault: the ratio in place of " << name_of(e);
+        }
+        for (const Estimator e : {Estimator::beale, Estimator::tin}) {
+            const Combined out = combine(s, Tau(std::span<const float>(taus)), all_of(e));
+            const Worst other = worst_of(in, out, e, e, !reliability);
+            EXPECT_GT(other.value, 12 * 0x1p-24) << "planted fault: weights of the other kind";
+            EXPECT_GT(other.error, 8 * 0x1p-24) << "planted fault: weights of the other kind";
         }
     }
 }
@@ -202,27 +216,30 @@ TEST(Estimator, device_matches_the_reference_in_double) {
 TEST(Estimator, device_bias_gain_and_need_match_the_reference) {
     const Engine engine;
     const GroupedInput in = input_of(1);
-    const Combined out =
-        combine(moments_of(engine, in, everything), Tau(std::span<const float>(taus)), all_of(Estimator::ratio));
-    for (std::size_t i = 0; i < values; ++i) {
-        Statistics s;
-        for (const auto& g : reference(in, i)) s.merge(g);
-        const double tau = static_cast<double>(taus[i]), r = s.mean_m / s.mean_t;
-        const double part = tau * r * s.m2_t * s.scale() / (s.mean_t * s.mean_t);
-        EXPECT_NEAR(static_cast<double>(out.bias[i]), bias_of_ratio(s, tau), 8 * 0x1p-24 * part);
-        const double gain = (s.m2_m - r * (2 * s.c_mt - r * s.m2_t)) / s.m2_m;
-        EXPECT_NEAR(static_cast<double>(out.gain[i]), gain, 8 * 0x1p-24 * gain);
-        const double excess = static_cast<double>(out.standard_error[i]) / (0.01 * static_cast<double>(out.estimate[i]));
-        EXPECT_NEAR(static_cast<double>(out.needed[i]), batch_count * (excess * excess - 1),
-                    1e-6 * batch_count * excess * excess);
+    for (const bool reliability : {false, true}) {
+        const Combined out = combine(moments_of(engine, in, with_weights(reliability)), Tau(std::span<const float>(taus)),
+                                     all_of(Estimator::ratio));
+        for (std::size_t i = 0; i < values; ++i) {
+            Statistics s;
+            for (const auto& g : reference(in, i)) s.merge(g);
+            const double tau = static_cast<double>(taus[i]), r = s.mean_m / s.mean_t;
+            const double part = tau * r * s.m2_t * s.scale(reliability) / (s.mean_t * s.mean_t);
+            EXPECT_NEAR(static_cast<double>(out.bias[i]), bias_of_ratio(s, tau, reliability), 8 * 0x1p-24 * part);
+            const double gain = (s.m2_m - r * (2 * s.c_mt - r * s.m2_t)) / s.m2_m;
+            EXPECT_NEAR(static_cast<double>(out.gain[i]), gain, 8 * 0x1p-24 * gain);
+            const double excess = static_cast<double>(out.standard_error[i]) / (0.01 * static_cast<double>(out.estimate[i]));
+            EXPECT_NEAR(static_cast<double>(out.needed[i]), batch_count * (excess * excess - 1),
+                        1e-6 * batch_count * excess * excess);
+        }
     }
 }
 
 TEST(Estimator, device_intervals_match_the_reference) {
     const Engine engine;
-    for (const std::size_t batches : {3, 4, 8, 23}) {
+    for (const auto& [batches, reliability] :
+         std::vector<std::pair<std::size_t, bool>>{{3, false}, {4, false}, {8, false}, {23, false}, {4, true}, {23, true}}) {
         const GroupedInput in = input_of(2, batches);
-        const Moments s = moments_of(engine, in, everything);
+        const Moments s = moments_of(engine, in, with_weights(reliability));
         const double q = student_quantile(0.95, static_cast<double>(batches - 1));
         const Combined delta =
             combine(s, Tau(std::span<const float>(taus)), all_of(Estimator::ratio, IntervalMethod::delta));
@@ -232,13 +249,13 @@ TEST(Estimator, device_intervals_match_the_reference) {
             Statistics all;
             for (const auto& g : reference(in, i)) all.merge(g);
             const double tau = static_cast<double>(taus[i]);
-            const Interval d = delta_interval(all, tau, q), f = fieller_interval(all, tau, q);
+            const Interval d = delta_interval(all, tau, q, reliability), f = fieller_interval(all, tau, q, reliability);
             const double width = d.upper - d.lower + std::fabs(d.upper);
             EXPECT_NEAR(static_cast<double>(delta.lower[i]), d.lower, 16 * 0x1p-24 * width);
             EXPECT_NEAR(static_cast<double>(delta.upper[i]), d.upper, 16 * 0x1p-24 * width);
             ++kinds[fieller.kind[i]];
             // Near g = 1 the ends run off to infinity: their error is that of 1 - g.
-            const double g = q * q * all.m2_t * all.scale() / (all.mean_t * all.mean_t);
+            const double g = q * q * all.m2_t * all.scale(reliability) / (all.mean_t * all.mean_t);
             const double condition = (1 + g) / std::fabs(1 - g);
             if (condition > 1e4) continue;
             ASSERT_EQ(fieller.kind[i], static_cast<std::uint32_t>(f.kind)) << batches << " batches, value " << i;

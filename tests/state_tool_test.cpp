@@ -217,6 +217,29 @@ TEST(StateTool, stopped_politely_it_saves_and_says_how_to_go_on) {
     EXPECT_EQ(verdict(state, batches, 120), "");
 }
 
+TEST(StateTool, stopped_without_a_state_it_leaves_no_file) {
+    const Scratch scratch;
+    const Batches batches(120);
+    const Words job = batches.combine(0, 120) + Words{"--tau", "1", "-o", scratch / "o.exr"};
+    RandomDelays delays(2);
+    int stopped = 0;
+    for (int k = 0; k < 200 && stopped < 3; ++k) {
+        const Said said = clratio_tool(job, {.signal = SIGTERM, .wait = [&] { delays.sleep(); }});
+        if (said.code == 0) {
+            delays.was_too_late();
+            std::filesystem::remove(scratch / "o.exr");
+        } else if (said.killed) {
+            delays.was_too_early();
+        } else {
+            EXPECT_EQ(said.code, 130);
+            expect_in("stopped after ", said.err);
+            ++stopped;
+        }
+        EXPECT_EQ(scratch.files(), 0u) << said.code << said.err;
+    }
+    EXPECT_EQ(stopped, 3);
+}
+
 TEST(StateTool, an_image_that_does_not_fit_loses_none_before_it) {
     const Scratch scratch;
     const Batches batches(2);

@@ -272,6 +272,32 @@ TEST(Tool, the_next_run_starts_from_the_kept_program) {
     EXPECT_EQ(entry_times(), times);
 }
 
+TEST(Tool, the_plain_mean_goes_without_tau) {
+    const Scratch scratch;
+    const Words mean = pairs("area", 3) + Words{"--estimator", "mean"};
+    const auto outputs = [&](const std::string& name) {
+        return Words{"-o",         scratch / (name + ".exr"),
+                     "--stderr",   scratch / (name + "e.exr"),
+                     "--lower",    scratch / (name + "l.exr"),
+                     "--interval", ".9",
+                     "--method",   "delta"};
+    };
+    answer(mean + outputs("a"));
+    answer(mean + Words{"--tau", "7"} + outputs("b"));
+    for (const char* kind : {".exr", "e.exr", "l.exr"})
+        EXPECT_EQ(read_image(scratch / ("a" + std::string(kind))).values,
+                  read_image(scratch / ("b" + std::string(kind))).values)
+            << kind;
+    const auto says_tau = [&](const char* name) {
+        Imf::MultiPartInputFile file((scratch / name).c_str());
+        return file.header(0).findTypedAttribute<Imf::StringAttribute>("clratio/tau") != nullptr;
+    };
+    EXPECT_FALSE(says_tau("a.exr"));
+    EXPECT_TRUE(says_tau("b.exr"));
+    expect_refused(mean + Words{"-o", scratch / "o.exr", "--interval", ".9"}, 2,
+                   "--tau is required for --bias and for --method");
+}
+
 TEST(Tool, usage_errors_exit_2) {
     const Words pair{"combine", "--m", "m.exr", "--t", "t.exr"};
     expect_refused({}, 2, "a subcommand is needed");

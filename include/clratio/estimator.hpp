@@ -77,15 +77,16 @@ struct Interval {
 };
 
 /// One value, read out in double. `groups`: one Statistics for each group of batches. tau and the mean of t must not be 0.
-/// An estimator that needs more than there is gives NaN: this reference falls back to nothing.
-double estimate(std::span<const Statistics> groups, Estimator estimator, double tau);
+/// An estimator that needs more than there is gives NaN: this reference falls back to nothing. `reliability`, here and below:
+/// weights are not sample counts, as Statistics::scale.
+double estimate(std::span<const Statistics> groups, Estimator estimator, double tau, bool reliability = false);
 /// The standard error as combine() defines it; +inf below two batches (regressions: three), NaN for the mean of ratios.
 double standard_error(std::span<const Statistics> groups, Estimator estimator, double tau, bool reliability = false);
 /// Of the ratio, to first order: (R Var(t) / t^2 - tau Cov / t^2) of the means.
-double bias_of_ratio(const Statistics& all, double tau);
+double bias_of_ratio(const Statistics& all, double tau, bool reliability = false);
 /// quantile: Student's or the normal's.
-Interval delta_interval(const Statistics& all, double tau, double quantile);
-Interval fieller_interval(const Statistics& all, double tau, double quantile);
+Interval delta_interval(const Statistics& all, double tau, double quantile, bool reliability = false);
+Interval fieller_interval(const Statistics& all, double tau, double quantile, bool reliability = false);
 
 /// Central moments of one sample relative to the means: C_jk = E[((m - mu) / mu)^j ((t - tau) / tau)^k].
 struct RelativeMoments {

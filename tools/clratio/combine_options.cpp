@@ -24,7 +24,7 @@ Estimators (docs/estimators.md says which one when):
   hartley-ross    unbiased where all weights are equal, from the ratios of single batches; suffers where t is small
   regression      mean(m) - beta (mean(t) - tau); the least noise where there are many batches
   crossfit-regression  the same, unbiased, with the slopes of the other --groups
-  mean            mean(m), for comparison; tau and t are not used
+  mean            mean(m), for comparison; goes without --tau
   mean-of-ratios  mean of tau m / t of each batch, for comparison; keeps a bias that no number of batches removes
 With too few batches or groups, the ratio (the regressions: the mean) stands in, flagged.
 
@@ -235,7 +235,10 @@ void require_enough(const Options& options) {
         throw UsageError("--m is required (or --state FILE --resume, to read a state out)");
     if (options.output.empty() && options.state.empty()) throw UsageError("--output is required (or --state, to add only)");
     if (options.output.empty() && options.m.empty()) throw UsageError("--output is required where no batch is added");
-    if (!options.output.empty() && options.tau.empty()) throw UsageError("--tau is required for an output");
+    if (!options.output.empty() && options.tau.empty() && options.uses_tau())
+        throw UsageError(options.chosen() == clratio::Estimator::mean
+                             ? "--tau is required for --bias and for --method fieller, which are of the ratio"
+                             : "--tau is required for an output (but for --estimator mean)");
     if (!options.output.empty()) return;
     std::vector<std::pair<const char*, bool>> needing{{"--reference", !options.reference.empty()},
                                                       {"--fail-on-flag", options.fail_on_flag},

@@ -53,6 +53,10 @@ struct Options {
     std::optional<double> until_error;
 
     clratio::Estimator chosen() const { return estimators.at(estimator); }
+    /// The plain mean, its error and its delta interval are the same for any tau.
+    bool uses_tau() const {
+        return chosen() != clratio::Estimator::mean || !bias.empty() || (interval && method != "delta");
+    }
     clratio::CombineOptions combine() const;
     Wanted wanted() const;
     /// Of a state that is begun here.

@@ -29,11 +29,11 @@ clratio::WriteOptions settings(const Options& options, const Sums& sums, const R
                                {"clratio/nonfinite", report.nonfinite},
                                {"clratio/batches", std::to_string(report.batches)},
                                {"clratio/ranges", report.ranges},
-                               {"clratio/tau", fmt::format("{}", fmt::join(options.tau, " "))},
                                {"clratio/device", report.device}}};
     const auto tell = [&](const char* name, const std::string& value) {
         all.attributes.emplace_back(std::string("clratio/") + name, value);
     };
+    if (!options.tau.empty()) tell("tau", fmt::format("{}", fmt::join(options.tau, " ")));
     if (sums.moments.groups > 1) tell("groups", std::to_string(sums.moments.groups));
     if (sums.fixed) {
         tell("fixed", std::to_string(sums.fixed->resolution));
@@ -89,7 +89,8 @@ Intervals summary(const clratio::CombinedImage& out, const clratio::Image& refer
 }  // namespace
 
 CombineRun::CombineRun(const Options& options)
-    : options_(options), tau_(options.tau, options.layer, !options.output.empty()),
+    : options_(options),
+      tau_(options.tau.empty() ? std::vector<std::string>{"1"} : options.tau, options.layer, !options.output.empty()),
       reference_file_(options.reference.empty() ? std::vector<std::string>() : std::vector{options.reference},
                       options.layer),
       keeper_(options), engine_(timed(report_.seconds.device, [] { return clratio::Engine{}; })), sums_(options.sums()) {

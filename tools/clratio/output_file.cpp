@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "clratio/exception.hpp"
+#include "output_target.hpp"
 
 namespace tool {
 namespace {
@@ -17,14 +18,9 @@ namespace fs = std::filesystem;
     throw clratio::IoError(file, "", "cannot be written: " + reason);
 }
 
-fs::path followed(const fs::path& file) {
-    const bool leads_nowhere = !fs::exists(file) && fs::is_symlink(fs::symlink_status(file));
-    return leads_nowhere ? followed(file.parent_path() / fs::read_symlink(file)) : fs::weakly_canonical(file);
-}
-
 std::string target_of(const std::string& file) {
     require_place_for(file);
-    return followed(file).string();
+    return clratio::output_target(file).string();
 }
 
 }  // namespace
