@@ -121,11 +121,22 @@ CLR_FN clr_moments clr_load_moments(clr_planes p, clr_state s, ulong i) {
 
 #define CLR_LINE 16  // floats of a cache line
 
-// A vector's share of a tile's hi and lo parts, each cache line once.
-CLR_FN void clr_prefetch_two(global const float* p, clr_state s, ulong i) {
-    p += (i / CLR_TILE * s.groups + s.place) * (2 * CLR_TILE) + i % CLR_TILE * 2;
+// Two floats for each lane of a vector, each cache line once.
+CLR_FN void clr_prefetch_vector(global const float* p) {
     CLR_UNROLL
     for (int k = 0; k < 2 * CLR_WIDTH; k += CLR_LINE) clr_prefetch(p + k);
+}
+
+// A vector's share of the hi and lo parts that a group has in a tile.
+CLR_FN void clr_prefetch_two(global const float* p, clr_state s, ulong i) {
+    clr_prefetch_vector(p + (i / CLR_TILE * s.groups + s.place) * (2 * CLR_TILE) + i % CLR_TILE * 2);
+}
+
+// A group's turn in a vector's share of what all groups have in a tile. Where every group takes its turn, lines are asked
+// for in the order of their addresses: a processor sees one run.
+CLR_FN void clr_prefetch_turn(global const float* p, clr_state s, ulong i) {
+    const ulong vector = i % CLR_TILE / CLR_WIDTH;
+    clr_prefetch_vector(p + i / CLR_TILE * s.groups * (2 * CLR_TILE) + (vector * s.groups + s.place) * (2 * CLR_WIDTH));
 }
 
 // Whether a plane's turn is in this pass: memory answers only so many requests at a time, so each pass over the groups makes
@@ -147,7 +158,7 @@ CLR_FN void clr_prefetch_planes(clr_planes p, clr_state s, clr_question ask, uin
     for (uint k = 0; k < 8; ++k) count += reads[k] ? 1 : 0;
     CLR_UNROLL
     for (uint k = 0; k < 8; ++k)
-        if (reads[k] && clr_has_turn(plane++, count, pass, passes)) clr_prefetch_two(planes[k], s, i);
+        if (reads[k] && clr_has_turn(plane++, count, pass, passes)) clr_prefetch_turn(planes[k], s, i);
 }
 
 CLR_FN void clr_store_moments(clr_moments r, clr_planes p, clr_state s, ulong i) {
