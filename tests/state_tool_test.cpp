@@ -217,17 +217,23 @@ TEST(StateTool, stopped_politely_it_saves_and_says_how_to_go_on) {
     EXPECT_EQ(verdict(state, batches, 120), "");
 }
 
-TEST(StateTool, stopped_without_a_state_it_leaves_no_file) {
+TEST(StateTool, stopped_without_a_state_it_leaves_no_file_or_a_whole_one) {
     const Scratch scratch;
     const Batches batches(120);
-    const Words job = batches.combine(0, 120) + Words{"--tau", "1", "-o", scratch / "o.exr"};
+    const std::string out = scratch / "o.exr";
+    const Words job = batches.combine(0, 120) + Words{"--tau", "1", "-o", out};
+    answer(job);
+    const std::string whole = bytes_of(out);
     RandomDelays delays(2);
     int stopped = 0;
     for (int k = 0; k < 200 && stopped < 3; ++k) {
+        std::filesystem::remove(out);
         const Said said = clratio_tool(job, {.signal = SIGTERM, .wait = [&] { delays.sleep(); }});
-        if (said.code == 0) {
+        const bool done = std::filesystem::exists(out);  // killed on its way out, where it was killed
+        EXPECT_EQ(scratch.files(), done ? 1u : 0u) << said.code << said.err;
+        if (done) {
+            EXPECT_TRUE(bytes_of(out) == whole);
             delays.was_too_late();
-            std::filesystem::remove(scratch / "o.exr");
         } else if (said.killed) {
             delays.was_too_early();
         } else {
@@ -235,7 +241,6 @@ TEST(StateTool, stopped_without_a_state_it_leaves_no_file) {
             expect_in("stopped after ", said.err);
             ++stopped;
         }
-        EXPECT_EQ(scratch.files(), 0u) << said.code << said.err;
     }
     EXPECT_EQ(stopped, 3);
 }

@@ -77,8 +77,8 @@ struct Interval {
 };
 
 /// One value, read out in double. `groups`: one Statistics for each group of batches. tau and the mean of t must not be 0.
-/// An estimator that needs more than there is gives NaN: this reference falls back to nothing. `reliability`, here and below:
-/// weights are not sample counts, as Statistics::scale.
+/// An estimator that needs more than there is gives NaN: this reference falls back to nothing. `reliability`, here and
+/// below: weights are not sample counts, as Statistics::scale.
 double estimate(std::span<const Statistics> groups, Estimator estimator, double tau, bool reliability = false);
 /// The standard error as combine() defines it; +inf below two batches (regressions: three), NaN for the mean of ratios.
 double standard_error(std::span<const Statistics> groups, Estimator estimator, double tau, bool reliability = false);
