@@ -183,8 +183,8 @@ double bias_of_ratio(const Statistics& s, double tau, bool reliability) {
 }
 
 Interval delta_interval(const Statistics& s, double tau, double quantile, bool reliability) {
-    const double value = tau * ratio(s), error = standard_error(std::span(&s, 1), Estimator::ratio, tau, reliability),
-                 width = quantile * error;
+    const double value = tau * ratio(s);
+    const double width = quantile * standard_error(std::span(&s, 1), Estimator::ratio, tau, reliability);
     if (!std::isfinite(width)) return {-infinite, infinite, IntervalKind::whole_line};
     return {value - width, value + width, IntervalKind::bounded};
 }

@@ -55,8 +55,12 @@ std::uint64_t bytes_of(const Shape& shape, std::uint64_t values) {
     return Moments::plane_stride(values) * shape.limbs * shape.bytes;
 }
 
+std::string bits_between(int least) {
+    return std::to_string(least) + " to " + std::to_string(FixedOptions::most_bits) + " bits";
+}
+
 void check_bits(const char* name, int bits) {
-    if (bits < 0 || bits > FixedOptions::most_bits) throw InvalidArgument(name, "0 to 48 bits", std::to_string(bits));
+    if (bits < 0 || bits > FixedOptions::most_bits) throw InvalidArgument(name, bits_between(0), std::to_string(bits));
 }
 
 void check_options(FixedOptions o) {
@@ -66,7 +70,7 @@ void check_options(FixedOptions o) {
     check_bits("range", o.range);
     const int bits = o.resolution + o.range;
     if (bits < FixedOptions::least_bits || bits > FixedOptions::most_bits)
-        throw InvalidArgument("resolution + range", "16 to 48 bits", std::to_string(bits));
+        throw InvalidArgument("resolution + range", bits_between(FixedOptions::least_bits), std::to_string(bits));
 }
 
 std::uint64_t whole_weight(double weight) {

@@ -121,6 +121,8 @@ device::clr_groups Moments::State::all_groups() const {
     for (std::size_t g = 0; g < groups.size(); ++g)
         all.of[g] = {static_cast<std::uint32_t>(groups[g].batches), groups[g].weight.hi, groups[g].weight.lo,
                      groups[g].weight2.hi, groups[g].weight2.lo};
+    all.held = static_cast<std::uint32_t>(
+        std::count_if(groups.begin(), groups.end(), [](const Group& g) { return g.batches != 0; }));
     describe_members(all);
     return all;
 }

@@ -144,7 +144,8 @@ CLR_FN clr_record clr_begin_joint(clr_planes base, const clr_groups* groups, clr
 }
 
 CLR_FN void clr_prefetch_group(clr_planes base, const clr_groups* groups, uint g, clr_question ask, uint pass, ulong i) {
-    clr_prefetch_planes(base, clr_state_of(groups, g), ask, pass, clr_asks_line(ask) ? 3 : 2, i + CLR_TILE);
+    const bool in_turn = groups->held == groups->count;
+    clr_prefetch_planes(base, clr_state_of(groups, g), ask, pass, clr_asks_line(ask) ? 3 : 2, in_turn, i + CLR_TILE);
 }
 
 // The first pass.
@@ -262,7 +263,7 @@ CLR_FN clr_whole clr_whole_of_all(const clr_groups* groups) { return clr_whole_o
 
 CLR_FN clr_joint clr_join(clr_planes base, const clr_groups* groups, clr_whole whole, clr_evidence n, clr_real tau,
                           clr_question ask, ulong i) {
-    clr_prefetch_planes(base, clr_state_of(groups, 0), ask, 0, 1, i + 8 * CLR_TILE);
+    clr_prefetch_planes(base, clr_state_of(groups, 0), ask, 0, 1, false, i + 8 * CLR_TILE);
     return clr_joint_of(clr_load_group(base, groups, 0, i), n, tau, ask.zero_policy);
 }
 

@@ -4,12 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
 
-#include "support/run.hpp"
+#include "support/tool.hpp"
 
+using clratio::test::clratio_tool;
+using clratio::test::Words;
 using nlohmann::json;
 using tool::audit::computed;
 using tool::audit::holds;
@@ -97,7 +98,7 @@ TEST(Audit, Holds) {
     EXPECT_FALSE(holds(computed("no refuted value", 1, 0.1, 1, nan)));
 }
 
-// docs/audit.md was printed by the command as it is now: the same claimsword for word.
+// docs/audit.md was printed by the command as it is now: the same claims word for word.
 void the_page_is_up_to_date(const json& rows) {
     const std::string page = clratio::test::bytes_of(CLRATIO_SOURCE "/docs/audit.md");
     for (const auto& row : rows)
@@ -108,7 +109,7 @@ void the_page_is_up_to_date(const json& rows) {
 }
 
 TEST(Audit, Quick) {
-    const auto said = clratio::test::run(CLRATIO_TOOL, {"audit", "--quick", "--json"});
+    const auto said = clratio_tool({"audit", "--quick", "--json"});
     ASSERT_EQ(said.code, 0) << said.err << said.out;
     EXPECT_EQ(said.err, "");
     const json rows = json::parse(said.out, nullptr, false);
@@ -121,17 +122,16 @@ TEST(Audit, Quick) {
 }
 
 TEST(Audit, TextFitsItsColumns) {
-    const auto said = clratio::test::run(CLRATIO_TOOL, {"audit", "--quick"});
+    const auto said = clratio_tool({"audit", "--quick"});
     EXPECT_EQ(said.code, 0);
     std::istringstream lines(said.out);
     for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 100u) << line;
 }
 
 TEST(Audit, RefusesWhatDoesNotFit) {
-    for (const std::vector<std::string>& words : {std::vector<std::string>{"audit", "--samples", "10"},
-                                                  {"audit", "-q", "--samples", "2000000"},
-                                                  {"audit", "--json", "--markdown"}}) {
-        const auto said = clratio::test::run(CLRATIO_TOOL, words);
+    for (const Words& words :
+         {Words{"audit", "--samples", "10"}, {"audit", "-q", "--samples", "2000000"}, {"audit", "--json", "--markdown"}}) {
+        const auto said = clratio_tool(words);
         EXPECT_EQ(said.code, 2) << said.err;
         EXPECT_EQ(said.out, "");
     }

@@ -219,18 +219,22 @@ TEST(Estimator, device_bias_gain_and_need_match_the_reference) {
     for (const bool reliability : {false, true}) {
         const Combined out = combine(moments_of(engine, in, with_weights(reliability)), Tau(std::span<const float>(taus)),
                                      all_of(Estimator::ratio));
+        std::size_t caught = 0;
         for (std::size_t i = 0; i < values; ++i) {
             Statistics s;
             for (const auto& g : reference(in, i)) s.merge(g);
             const double tau = static_cast<double>(taus[i]), r = s.mean_m / s.mean_t;
             const double part = tau * r * s.m2_t * s.scale(reliability) / (s.mean_t * s.mean_t);
-            EXPECT_NEAR(static_cast<double>(out.bias[i]), bias_of_ratio(s, tau, reliability), 8 * 0x1p-24 * part);
+            const double bias = static_cast<double>(out.bias[i]);
+            EXPECT_NEAR(bias, bias_of_ratio(s, tau, reliability), 8 * 0x1p-24 * part);
+            caught += std::fabs(bias - bias_of_ratio(s, tau, !reliability)) > 8 * 0x1p-24 * part;
             const double gain = (s.m2_m - r * (2 * s.c_mt - r * s.m2_t)) / s.m2_m;
             EXPECT_NEAR(static_cast<double>(out.gain[i]), gain, 8 * 0x1p-24 * gain);
             const double excess = static_cast<double>(out.standard_error[i]) / (0.01 * static_cast<double>(out.estimate[i]));
             EXPECT_NEAR(static_cast<double>(out.needed[i]), batch_count * (excess * excess - 1),
                         1e-6 * batch_count * excess * excess);
         }
+        EXPECT_GT(caught, values / 2) << "planted fault: weights of the other kind";
     }
 }
 
@@ -244,7 +248,7 @@ TEST(Estimator, device_intervals_match_the_reference) {
         const Combined delta =
             combine(s, Tau(std::span<const float>(taus)), all_of(Estimator::ratio, IntervalMethod::delta));
         const Combined fieller = combine(s, Tau(std::span<const float>(taus)), all_of(Estimator::ratio));
-        std::size_t kinds[3] = {0, 0, 0};
+        std::size_t kinds[3] = {0, 0, 0}, caught = 0, compared = 0, caught_fieller = 0;
         for (std::size_t i = 0; i < values; ++i) {
             Statistics all;
             for (const auto& g : reference(in, i)) all.merge(g);
@@ -253,6 +257,8 @@ TEST(Estimator, device_intervals_match_the_reference) {
             const double width = d.upper - d.lower + std::fabs(d.upper);
             EXPECT_NEAR(static_cast<double>(delta.lower[i]), d.lower, 16 * 0x1p-24 * width);
             EXPECT_NEAR(static_cast<double>(delta.upper[i]), d.upper, 16 * 0x1p-24 * width);
+            const double other = delta_interval(all, tau, q, !reliability).upper;
+            caught += std::fabs(static_cast<double>(delta.upper[i]) - other) > 16 * 0x1p-24 * width;
             ++kinds[fieller.kind[i]];
             // Near g = 1 the ends run off to infinity: their error is that of 1 - g.
             const double g = q * q * all.m2_t * all.scale(reliability) / (all.mean_t * all.mean_t);
@@ -266,8 +272,13 @@ TEST(Estimator, device_intervals_match_the_reference) {
             const double size = condition * (std::fabs(f.lower) + std::fabs(f.upper) + width);
             EXPECT_NEAR(static_cast<double>(fieller.lower[i]), f.lower, 32 * 0x1p-24 * size);
             EXPECT_NEAR(static_cast<double>(fieller.upper[i]), f.upper, 32 * 0x1p-24 * size);
+            ++compared;
+            const double of_other = fieller_interval(all, tau, q, !reliability).upper;
+            caught_fieller += !(std::fabs(static_cast<double>(fieller.upper[i]) - of_other) <= 32 * 0x1p-24 * size);
         }
         EXPECT_GT(kinds[0], 0u);
+        EXPECT_GT(caught, values / 2) << "planted fault: weights of the other kind";
+        EXPECT_GT(caught_fieller, compared / 2) << "planted fault: weights of the other kind";
         if (batches == 3) {
             EXPECT_GT(kinds[1] + kinds[2], 0u) << "no unbounded interval was tried";
         }

@@ -51,7 +51,7 @@ typedef struct {
 
 // All groups of a state.
 typedef struct {
-    clr_u32 options, count;
+    clr_u32 options, count, held;  // held: those that have a batch
     clr_group of[CLR_MOST_GROUPS];
     clr_member member[CLR_MOST_GROUPS];
 } clr_groups;
@@ -132,8 +132,8 @@ CLR_FN void clr_prefetch_two(global const float* p, clr_state s, ulong i) {
     clr_prefetch_vector(p + (i / CLR_TILE * s.groups + s.place) * (2 * CLR_TILE) + i % CLR_TILE * 2);
 }
 
-// A group's turn in a vector's share of what all groups have in a tile. Where every group takes its turn, lines are asked
-// for in the order of their addresses: a processor sees one run.
+// A group's turn in a vector's share of what all groups have in a tile. If every group takes its turn, lines are asked for
+// in the order of their addresses, and a processor sees one run.
 CLR_FN void clr_prefetch_turn(global const float* p, clr_state s, ulong i) {
     const ulong vector = i % CLR_TILE / CLR_WIDTH;
     clr_prefetch_vector(p + i / CLR_TILE * s.groups * (2 * CLR_TILE) + (vector * s.groups + s.place) * (2 * CLR_WIDTH));
@@ -147,7 +147,7 @@ CLR_FN bool clr_has_turn(uint plane, uint planes, uint pass, uint passes) {
 }
 
 // The planes of an estimator: several are more streams than a processor fetches ahead by itself. i may lie past the end.
-CLR_FN void clr_prefetch_planes(clr_planes p, clr_state s, clr_question ask, uint pass, uint passes, ulong i) {
+CLR_FN void clr_prefetch_planes(clr_planes p, clr_state s, clr_question ask, uint pass, uint passes, bool in_turn, ulong i) {
     const bool mean = ask.estimator == CLR_ESTIMATOR_MEAN, averages = ask.estimator == CLR_ESTIMATOR_MEAN_OF_RATIOS;
     const bool pair = !mean && !averages, scatter = !averages && clr_asks_scatter(ask), both = pair && scatter;
     const bool ratios = clr_uses_ratios(ask.estimator), flags = (ask.outputs & (CLR_WRITE_FLAGS | CLR_COUNT_FLAGS)) != 0;
@@ -158,7 +158,12 @@ CLR_FN void clr_prefetch_planes(clr_planes p, clr_state s, clr_question ask, uin
     for (uint k = 0; k < 8; ++k) count += reads[k] ? 1 : 0;
     CLR_UNROLL
     for (uint k = 0; k < 8; ++k)
-        if (reads[k] && clr_has_turn(plane++, count, pass, passes)) clr_prefetch_turn(planes[k], s, i);
+        if (reads[k] && clr_has_turn(plane++, count, pass, passes)) {
+            if (in_turn)
+                clr_prefetch_turn(planes[k], s, i);
+            else
+                clr_prefetch_two(planes[k], s, i);
+        }
 }
 
 CLR_FN void clr_store_moments(clr_moments r, clr_planes p, clr_state s, ulong i) {
