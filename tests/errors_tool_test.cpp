@@ -10,11 +10,11 @@
 #include <map>
 #include <numbers>
 #include <numeric>
-#include <sstream>
 
 #include "clratio/fit.hpp"
 #include "clratio/histogram.hpp"
 #include "clratio/law.hpp"
+#include "support/split.hpp"
 #include "support/tool.hpp"
 
 using namespace clratio;
@@ -26,14 +26,6 @@ const ErrorModel paper{.5, 1, .5, .35};
 const Words model{"errors", "--mu", ".5", "--tau", "1", "--sigma-m", ".5", "--sigma-t", ".35"};
 
 json counted(const Words& words) { return answer(model + words); }
-
-std::vector<std::string> split(const std::string& text, char by) {
-    std::vector<std::string> parts;
-    std::istringstream in(text);
-    for (std::string part; std::getline(in, part, by);) parts.push_back(part);
-    if (!text.empty() && text.back() == by && by == ',') parts.emplace_back();
-    return parts;
-}
 
 struct Csv {
     std::string header;

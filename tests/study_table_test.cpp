@@ -162,7 +162,7 @@ TEST(Study, SlowFullStudyHasTheTable) {
     const Scratch scratch;
     answer({"study", "--no-report", "-o", scratch / "full"});
     answer({"study", "--quick", "--no-report", "-o", scratch / "quick"});
-    const Csv full_csv(scratch / "full"), quick_csv(scratch / "quick");
+    const StudyFiles full_csv(scratch / "full"), quick_csv(scratch / "quick");
     const Errors full(full_csv.errors), quick(quick_csv.errors);
     const auto row = [](const std::string& line, std::size_t level) {
         return line + " " + std::to_string(1 << level) + " all";

@@ -21,11 +21,11 @@ const Words small{"study", "--scenes", "spheres", "--size", "12x9", "--seeds", "
 constexpr int pieces = 30;
 
 /// Of the small study in one go.
-const Csv& whole() {
-    static const Csv csv = [] {
+const StudyFiles& whole() {
+    static const StudyFiles csv = [] {
         const Scratch scratch;
         EXPECT_EQ(answer(small + Words{"-o", scratch / "s"})["computed"], pieces);
-        return Csv(scratch / "s");
+        return StudyFiles(scratch / "s");
     }();
     return csv;
 }
@@ -93,7 +93,7 @@ TEST(Study, bytes_are_the_same_for_any_shards) {
     const json said = answer(small + Words{"--merge", a, b, "-o", c});
     EXPECT_EQ(said["taken"], 20);
     EXPECT_EQ(said["computed"], 10);
-    EXPECT_EQ(Csv(c), whole());
+    EXPECT_EQ(StudyFiles(c), whole());
 }
 
 TEST(Study, goes_on_after_being_killed_at_any_moment) {
@@ -107,7 +107,7 @@ TEST(Study, goes_on_after_being_killed_at_any_moment) {
     }
     answer(words);
     EXPECT_GT(killed, 0);
-    EXPECT_EQ(Csv(scratch / "s"), whole());
+    EXPECT_EQ(StudyFiles(scratch / "s"), whole());
     EXPECT_EQ(answer(words)["computed"], 0);
 }
 
@@ -141,7 +141,7 @@ TEST(Study, damaged_parts_are_computed_again) {
         put_bytes(some_part(folder), cut);
         EXPECT_EQ(answer(words)["computed"], 1) << cut.size();
     }
-    EXPECT_EQ(Csv(folder), whole());
+    EXPECT_EQ(StudyFiles(folder), whole());
 }
 
 // What the checks above look at does depend on the parts: one that is sealed but wrong is believed, and shows.
@@ -157,7 +157,7 @@ TEST(Study, a_forged_part_shows) {
     settings["sums"][3][1] = forged["sums"][3][1].get<std::int64_t>();
     put_bytes(some_part(folder), sealed(settings.dump() + "\n"));
     EXPECT_EQ(answer(small + Words{"-o", folder})["computed"], 0);
-    EXPECT_NE(Csv(folder), whole());
+    EXPECT_NE(StudyFiles(folder), whole());
 }
 
 TEST(Study, parts_of_another_scene_of_the_same_name_are_not_taken) {
@@ -170,7 +170,7 @@ TEST(Study, parts_of_another_scene_of_the_same_name_are_not_taken) {
     Words other = small + Words{"-o", folder};
     other[2] = file;
     EXPECT_EQ(answer(other)["computed"], pieces);
-    EXPECT_NE(Csv(folder), whole());
+    EXPECT_NE(StudyFiles(folder), whole());
 }
 
 TEST(Study, more_seeds_keep_the_parts_there_are) {
@@ -303,7 +303,7 @@ TEST(Study, parts_have_their_times_in_a_file_of_their_own) {
     EXPECT_NE(bytes_of(b + "/report.html").find("15 of 30 parts"), std::string::npos);
     EXPECT_EQ(clratio_tool(with_report + Words{"-o", a}).code, 0);
     EXPECT_NE(bytes_of(a + "/report.html").find("30 of 30 parts"), std::string::npos);
-    EXPECT_EQ(Csv(a), whole());
+    EXPECT_EQ(StudyFiles(a), whole());
 }
 
 TEST(Study, report_stands_alone) {
@@ -328,6 +328,6 @@ TEST(Study, SlowBytesAreTheSameAtAnyWidth) {
     for (const char* lanes : {"1", "4"}) {
         const Scratch scratch;
         EXPECT_EQ(answer(small + Words{"--lanes", lanes, "-o", scratch / "s"})["computed"], pieces);
-        EXPECT_EQ(Csv(scratch / "s"), whole()) << lanes;
+        EXPECT_EQ(StudyFiles(scratch / "s"), whole()) << lanes;
     }
 }

@@ -5,26 +5,19 @@
 
 #include <cmath>
 #include <map>
-#include <sstream>
 
+#include "support/split.hpp"
 #include "support/tool.hpp"
 
 namespace clratio::test {
 
-struct Csv {
+struct StudyFiles {
     std::string errors, densities, chords, averages;
-    explicit Csv(const std::string& folder)
+    explicit StudyFiles(const std::string& folder)
         : errors(bytes_of(folder + "/errors.csv")), densities(bytes_of(folder + "/densities.csv")),
           chords(bytes_of(folder + "/short_chords.csv")), averages(bytes_of(folder + "/averages.csv")) {}
-    bool operator==(const Csv&) const = default;
+    bool operator==(const StudyFiles&) const = default;
 };
-
-inline std::vector<std::string> split(const std::string& text, char by) {
-    std::vector<std::string> parts;
-    std::istringstream in(text);
-    for (std::string part; std::getline(in, part, by);) parts.push_back(part);
-    return parts;
-}
 
 /// Numbers of a CSV file by column name; rows by their first columns, with spaces between. errors.csv: "scene sampling
 /// pattern t estimate n channel".
