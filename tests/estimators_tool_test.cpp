@@ -38,7 +38,10 @@ const std::vector<Known> model_a{{"mean", 4, 0, 1.63},
                                  {"mickey, 8 groups", 8, 0, 1.16},
                                  {"mickey, 8 groups", 16, 0, 1.12},
                                  {"regression", 8, -.23, 1.12},
+                                 {"crossfit-regression, 8", 8, 0, 1.39},
                                  {"crossfit-regression, 8", 16, 0, 1.23},
+                                 {"mean-of-ratios, 8 batches", 8, -1.3, .95},
+                                 {"mean-of-ratios, 8 batches", 16, -1.6, 1.00},
                                  {"mean-of-ratios", 16, -2.6, 1.06}};
 
 /// How far a cell is from the table, in units of what rounding (half of the last digit printed, and of the table's own

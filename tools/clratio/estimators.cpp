@@ -36,8 +36,9 @@ struct Cell {
 struct Row {
     std::string name;
     Estimator estimator;
-    std::uint32_t groups;  ///< 0: any number serves
-    std::vector<Cell> cells;
+    std::uint32_t groups = 0;  ///< 0: any number serves
+    std::uint32_t joined = 0;  ///< batches that the samples are joined to; 0: they stay as they come
+    std::vector<Cell> cells = {};
 };
 
 struct Coverage {
@@ -53,30 +54,40 @@ struct Result {
 };
 
 constexpr std::uint64_t most_replicates = 1 << 18;
-constexpr std::uint32_t few_groups = 2, many_groups = 8;
+constexpr std::uint32_t few_groups = 2, many_groups = 8, few_batches = 8;
 
 std::vector<Row> rows() {
-    return {{"mean", Estimator::mean, 0, {}},
-            {"ratio", Estimator::ratio, 0, {}},
-            {"beale", Estimator::beale, 0, {}},
-            {"tin", Estimator::tin, 0, {}},
-            {"jackknife, 2 groups", Estimator::jackknife, few_groups, {}},
-            {"jackknife, 8 groups", Estimator::jackknife, many_groups, {}},
-            {"hartley-ross", Estimator::hartley_ross, 0, {}},
-            {"mickey, 8 groups", Estimator::mickey, many_groups, {}},
-            {"regression", Estimator::regression, 0, {}},
-            {"crossfit-regression, 8", Estimator::crossfit_regression, many_groups, {}},
-            {"mean-of-ratios", Estimator::mean_of_ratios, 0, {}}};
+    return {{"mean", Estimator::mean},
+            {"ratio", Estimator::ratio},
+            {"beale", Estimator::beale},
+            {"tin", Estimator::tin},
+            {"jackknife, 2 groups", Estimator::jackknife, few_groups},
+            {"jackknife, 8 groups", Estimator::jackknife, many_groups},
+            {"hartley-ross", Estimator::hartley_ross},
+            {"mickey, 8 groups", Estimator::mickey, many_groups},
+            {"regression", Estimator::regression},
+            {"crossfit-regression, 8", Estimator::crossfit_regression, many_groups},
+            {"mean-of-ratios, 8 batches", Estimator::mean_of_ratios, 0, few_batches},
+            {"mean-of-ratios", Estimator::mean_of_ratios}};
 }
 
 /// Fewer batches than this leave an estimator without meaning, or without a mean.
 std::uint64_t least_batches(const Row& row) {
     if (row.estimator == Estimator::regression) return 4;
-    if (row.estimator == Estimator::crossfit_regression) return 2 * row.groups;
-    return std::max<std::uint64_t>(row.groups, clratio::needs_of(row.estimator).batches);
+    return std::max<std::uint64_t>({row.groups, row.joined, clratio::needs_of(row.estimator).batches});
 }
 
 std::uint32_t weight_of(std::uint64_t batch, bool unequal) { return unequal ? 1 + batch % 4 : 1; }
+
+std::uint64_t weight_of_all(std::uint64_t batches, bool unequal) {
+    std::uint64_t sum = 0;
+    for (std::uint64_t k = 0; k < batches; ++k) sum += weight_of(k, unequal);
+    return sum;
+}
+
+bool has_cell(const Row& row, std::uint64_t batches, std::uint64_t weight) {
+    return batches >= least_batches(row) && (row.joined == 0 || weight % row.joined == 0);
+}
 
 /// Sums over replicates, merged over rounds.
 struct Tally {
@@ -130,15 +141,19 @@ public:
         const std::uint64_t replicates = std::max<std::uint64_t>(1, options_.samples / batches);
         std::vector<Tally> tallies(result.rows.size());
         CoverageTally mean, delta, fieller;
-        double weight = 0;
-        for (std::uint64_t k = 0; k < batches; ++k) weight += weight_of(k, options_.unequal);
+        const std::uint64_t weight = weight_of_all(batches, options_.unequal);
         for (std::uint64_t done = 0; done < replicates; done += most_replicates) {
             const std::uint64_t count = std::min(most_replicates, replicates - done);
-            const auto [few, many] = states(batches, count);
+            const std::uint64_t seed = options_.seed * 1'000'003 + round_++;
+            const auto states = grouped(seed, batches, count);
+            const Moments &few = states[0], &many = states[1];
             for (std::size_t r = 0; r < tallies.size(); ++r) {
                 const Row& row = result.rows[r];
-                if (batches < least_batches(row)) continue;
-                tallies[r].add(read(row.groups == few_groups ? few : many, {.estimator = row.estimator}).estimate, model_);
+                if (!has_cell(row, batches, weight)) continue;
+                const CombineOptions of_row{.estimator = row.estimator};
+                const auto out = row.joined ? read(joined(seed, row.joined, weight, count), of_row)
+                                            : read(row.groups == few_groups ? few : many, of_row);
+                tallies[r].add(out.estimate, model_);
             }
             if (batches < 4) continue;
             mean.add(read(many, interval(Estimator::mean, IntervalMethod::delta)), model_.mu);
@@ -146,7 +161,7 @@ public:
             fieller.add(read(many, interval(Estimator::ratio, IntervalMethod::fieller)), model_.mu);
         }
         for (std::size_t r = 0; r < tallies.size(); ++r)
-            if (tallies[r].count > 0) result.rows[r].cells.push_back(tallies[r].cell(batches, weight));
+            if (tallies[r].count > 0) result.rows[r].cells.push_back(tallies[r].cell(batches, static_cast<double>(weight)));
         if (fieller.count > 0)
             result.coverage.push_back(
                 {batches, mean.measured(), delta.measured(), fieller.measured(), fieller.unbounded / fieller.count});
@@ -160,23 +175,40 @@ private:
         return o;
     }
 
-    std::pair<Moments, Moments> states(std::uint64_t batches, std::uint64_t count) {
-        const auto make = [&](std::uint32_t groups) {
-            return Moments(engine_, count, {.nonfinite = clratio::NonFinite::propagate, .ratios = true, .groups = groups});
-        };
-        std::pair<Moments, Moments> both{make(few_groups), make(many_groups)};
-        PairSampler sampler(engine_, model_, count, options_.seed * 1'000'003 + round_++);
+    Moments empty(std::uint64_t count, std::uint32_t groups) const {
+        return {engine_, count, {.nonfinite = clratio::NonFinite::propagate, .ratios = true, .groups = groups}};
+    }
+
+    /// Samples 0, 1, .. of a seed, so many to a batch.
+    void fill(std::span<Moments> states, std::uint64_t seed, const std::vector<std::uint32_t>& weights) const {
+        PairSampler sampler(engine_, model_, states[0].size(), seed);
         cl_event last = nullptr;
-        for (std::uint64_t k = 0; k < batches; ++k) {
-            const clratio::Batch batch = sampler.next(weight_of(k, options_.unequal));
-            for (Moments* s : {&both.first, &both.second}) {
+        for (const std::uint32_t weight : weights) {
+            const clratio::Batch batch = sampler.next(weight);
+            for (Moments& s : states) {
                 if (last) clReleaseEvent(last);
-                last = s->add(std::span(&batch, 1), {});
+                last = s.add(std::span(&batch, 1), {});
             }
         }
         clWaitForEvents(1, &last);
         clReleaseEvent(last);
-        return both;
+    }
+
+    /// States of few and of many groups.
+    std::vector<Moments> grouped(std::uint64_t seed, std::uint64_t batches, std::uint64_t count) const {
+        std::vector<Moments> states;
+        for (const std::uint32_t groups : {few_groups, many_groups}) states.push_back(empty(count, groups));
+        std::vector<std::uint32_t> weights;
+        for (std::uint64_t k = 0; k < batches; ++k) weights.push_back(weight_of(k, options_.unequal));
+        fill(states, seed, weights);
+        return states;
+    }
+
+    /// The same samples in few batches of equal weight.
+    Moments joined(std::uint64_t seed, std::uint32_t batches, std::uint64_t weight, std::uint64_t count) const {
+        Moments sum = empty(count, 1);
+        fill({&sum, 1}, seed, std::vector(batches, static_cast<std::uint32_t>(weight / batches)));
+        return sum;
     }
 
     clratio::Combined read(const Moments& s, const CombineOptions& options) const {
@@ -225,6 +257,8 @@ void print_markdown(const Result& result, const Options& options) {
     print_rows(result, at, [](const Cell& c) { return fmt::format("{:+.3f} ± {:.3f}", c.bias.mean, c.bias.error); });
     fmt::print("\n√N · RMSE / E[m] ± standard error\n\n");
     print_rows(result, at, [](const Cell& c) { return fmt::format("{:.3f} ± {:.3f}", c.rmse.mean, c.rmse.error); });
+    fmt::print("\nShare of estimates outside [0, tau]\n\n");
+    print_rows(result, at, [](const Cell& c) { return fmt::format("{:.4f}", c.outside); });
     fmt::print("\nCoverage of intervals of level .95\n\n| N | mean, delta | ratio, delta | ratio, Fieller | not bounded |\n"
                "|---|---|---|---|---|\n");
     const auto share = [](const Measured& m) { return fmt::format("{:.4f} ± {:.4f}", m.mean, m.error); };
