@@ -22,17 +22,18 @@ bool wants_more(const CombineOutput& out) { return wants_interval(out) || out.bi
 bool regresses(Estimator e) { return device::clr_is_regression(static_cast<std::uint32_t>(e)); }
 
 /// The interval's quantile for a value of so many batches.
-double quantile_for(const CombineOptions& options, std::uint64_t batches) {
-    const std::uint64_t lost = regresses(options.estimator) ? 2 : 1;
-    return student_quantile(options.level, static_cast<double>(batches > lost ? batches - lost : 1));
+/// `trials`: batches, or the groups of a jackknife.
+double quantile_for(const CombineOptions& options, std::uint64_t trials) {
+    const std::uint64_t lost = regresses(options.estimator) && options.method == IntervalMethod::delta ? 2 : 1;
+    return student_quantile(options.level, static_cast<double>(trials > lost ? trials - lost : 1));
 }
 
 constexpr std::uint64_t longest_table = 1024;
 
-/// Where values may differ in their number of batches.
-Buffer quantile_table(const Engine& engine, std::uint64_t batches, const CombineOptions& options) {
+/// Where values may differ in their number of trials.
+Buffer quantile_table(const Engine& engine, std::uint64_t most, const CombineOptions& options) {
     std::vector<float> table;
-    for (std::uint64_t k = 0; k <= std::min(batches, longest_table); ++k)
+    for (std::uint64_t k = 0; k <= std::min(most, longest_table); ++k)
         table.push_back(static_cast<float>(quantile_for(options, k)));
     return Buffer::copy_of(engine, std::as_bytes(std::span(table)));
 }
@@ -155,7 +156,8 @@ std::string program_options(const Moments::State& s, const Reading& reading) {
 
 Event read_moments(const Moments& moments, Reading reading, std::span<const cl_event> waits) {
     auto& s = moments.state();
-    if (wants_interval(reading.out) && s.options.nonfinite == NonFinite::skip)
+    const bool counts_groups = reading.options.estimator == Estimator::jackknife;
+    if (wants_interval(reading.out) && (counts_groups || s.options.nonfinite == NonFinite::skip))
         reading.quantiles = quantile_table(s.engine, s.batches(), reading.options);
     Launch launch(s.engine, "combine", "clr_combine_moments", program_options(s, reading), Lanes::wide);
     s.give_planes(launch).arg(s.all_groups());
@@ -238,8 +240,10 @@ void check_estimator(const CombineOptions& options, const MomentsOptions& state)
     };
     if (needs.ratios && !state.ratios) refuse(".ratios = true");
     if (needs.groups && state.groups < 2) refuse(".groups of 2 to 16");
-    if (options.standard_error && options.estimator == Estimator::mean_of_ratios)
-        throw InvalidArgument("standard_error", "an estimator that has one", "mean-of-ratios, which has none");
+    if (options.zero > Zero::one)
+        throw InvalidArgument("zero", "a policy of Zero", std::to_string(static_cast<int>(options.zero)));
+    if (options.method > IntervalMethod::fieller)
+        throw InvalidArgument("method", "one of IntervalMethod", std::to_string(static_cast<std::uint32_t>(options.method)));
     if (!(options.level > 0 && options.level < 1))
         throw InvalidArgument("level", "a number in (0, 1)", std::to_string(options.level));
     const auto is_target = [](float x) { return x >= 0 && std::isfinite(x); };
@@ -250,15 +254,16 @@ void check_estimator(const CombineOptions& options, const MomentsOptions& state)
 
 void Reading::check(std::uint64_t count, std::span<const std::pair<const char*, View>> inputs) const {
     check_view("tau", tau, count);
-    std::vector<std::pair<const char*, View>> others(inputs.begin(), inputs.end());
-    others.emplace_back("tau", tau);
+    std::vector<std::pair<const char*, View>> read(inputs.begin(), inputs.end()), written;
+    read.emplace_back("tau", tau);
     const auto output = [&](const char* name, const View& v) {
         if (!v.mem) return;
         check_view(name, v, count);
         if (v.stride < v.channels)
             throw InvalidArgument(name, "a stride of at least its channels", std::to_string(v.stride));
-        for (const auto& [other_name, other] : others) check_overlap(name, v, other_name, other);
-        others.emplace_back(name, v);
+        for (const auto& [other_name, other] : read) check_overlap(name, v, other_name, other);
+        for (const auto& [other_name, other] : written) check_apart(name, v, other_name, other);
+        written.emplace_back(name, v);
     };
     output("estimate", out.estimate);
     output("standard_error", out.standard_error);

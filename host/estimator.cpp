@@ -33,7 +33,11 @@ constexpr std::array table{
     Row{Estimator::crossfit_regression, "crossfit-regression", {.groups = true, .batches = 2}},
 };
 
-const Row& row(Estimator estimator) { return table.at(static_cast<std::size_t>(estimator)); }
+const Row& row(Estimator estimator) {
+    const auto place = static_cast<std::size_t>(estimator);
+    if (place >= table.size()) throw InvalidArgument("estimator", "one of all_estimators()", std::to_string(place));
+    return table[place];
+}
 
 Statistics sum_of(std::span<const Statistics> groups) {
     Statistics all;
@@ -108,7 +112,7 @@ Needs needs_of(Estimator estimator) { return row(estimator).needs; }
 
 double student_quantile(double level, double freedom) {
     if (!(level > 0 && level < 1)) throw InvalidArgument("level", "a number in (0, 1)", std::to_string(level));
-    if (!(freedom > 0)) throw InvalidArgument("freedom", "a number above 0", std::to_string(freedom));
+    if (!(freedom >= 0.5)) throw InvalidArgument("freedom", "a number from .5 on", std::to_string(freedom));
     return boost::math::quantile(boost::math::complement(boost::math::students_t(freedom), (1 - level) / 2));
 }
 
@@ -175,6 +179,7 @@ double standard_error(std::span<const Statistics> groups, Estimator estimator, d
     if (estimator == Estimator::mean) return std::sqrt(s.m2_m * n);
     if (regresses) return std::sqrt(std::max(0.0, regression_residual(s)) * n * (k - 1) / (k - 2));
     if (estimator == Estimator::jackknife) return std::sqrt(jackknife_variance(groups, tau));
+    if (estimator == Estimator::hartley_ross) return std::sqrt(std::max(0.0, residual(s, s.mean_quotient)) * n);
     return std::fabs(tau / s.mean_t) * std::sqrt(std::max(0.0, residual(s, ratio(s))) * n);
 }
 

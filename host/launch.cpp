@@ -149,16 +149,19 @@ void check_view(const char* name, const View& view, std::uint64_t count) {
     if (view.channels == 0) throw InvalidArgument(name, "at least one channel", "0");
     std::size_t bytes = 0;
     check(clGetMemObjectInfo(view.mem, CL_MEM_SIZE, sizeof bytes, &bytes, nullptr), "clGetMemObjectInfo");
-    if (view.end() > bytes / sizeof(float))
+    if (!view.fits(bytes / sizeof(float)))
         throw InvalidArgument(name, "a view inside its buffer of " + std::to_string(bytes / sizeof(float)) + " elements",
-                              "one that ends at " + std::to_string(view.end()));
+                              "one of " + std::to_string(view.count) + " values that ends at " + std::to_string(view.end()));
+}
+
+void check_apart(const char* name, const View& output, const char* other_name, const View& other) {
+    if (output.mem == other.mem && output.offset < other.end() && other.offset < output.end())
+        throw InvalidArgument(name, std::string("a view apart from ") + other_name, "one that overlaps it");
 }
 
 void check_overlap(const char* name, const View& output, const char* other_name, const View& other) {
-    if (output.mem != other.mem || same_elements(output, other)) return;
-    if (output.offset < other.end() && other.offset < output.end())
-        throw InvalidArgument(name, std::string("a view apart from ") + other_name + ", or the very same",
-                              "one that overlaps it");
+    if (output.mem == other.mem && same_elements(output, other)) return;
+    check_apart(name, output, (std::string(other_name) + ", or the very same").c_str(), other);
 }
 
 Launch::Launch(const Engine& engine, const std::string& word, const std::string& kernel, const std::string& options,

@@ -49,6 +49,8 @@ std::size_t most_work_items(const Engine& engine);
 
 /// Throws InvalidArgument unless the view holds `count` values inside its buffer.
 void check_view(const char* name, const View& view, std::uint64_t count);
+/// Throws InvalidArgument where the elements of two outputs lie among each other.
+void check_apart(const char* name, const View& output, const char* other_name, const View& other);
 /// Throws InvalidArgument where an output shares elements with another view without being the same view.
 void check_overlap(const char* name, const View& output, const char* other_name, const View& other);
 

@@ -231,7 +231,7 @@ CLR_FN clr_joint clr_join(clr_planes base, const clr_groups* groups, clr_whole w
     clr_joint j = clr_join_groups(base, groups, whole, n, tau, ask, i);
     if (!clr_asks_within(ask)) {
         j.spread = clr_spread_none();
-        if (clr_any(clr_has_delta_error(j))) j.spread = clr_spread_within(base, groups, whole, tau, ask, i);
+        if (clr_any(clr_has_delta_error(j, tau))) j.spread = clr_spread_within(base, groups, whole, tau, ask, i);
     }
     if (!clr_asks_line(ask)) return j;
     const bool crossfits = ask.estimator == CLR_ESTIMATOR_CROSSFIT_REGRESSION;
@@ -305,8 +305,8 @@ CLR_SPAN_FN void clr_combine_span(const clr_read* w, const clr_groups* groups, c
             j.n = clr_evidence_of(j.all.batches, j.all.weight, j.all.weight2, ask.reliability);
         else
             j.all.batches = n.batches;
-        const clr_estimate e =
-            clr_read_out(j, reading->added, control, clr_quantile_for(j.all.batches, *reading, w->quantiles), ask);
+        const clr_real quantile = clr_quantile_for(clr_trials(j, control, ask), *reading, w->quantiles);
+        const clr_estimate e = clr_read_out(j, reading->added, control, quantile, ask);
         clr_write_reading(e, *reading, ask.outputs, w->to, &tally, first, w->count);
     }
     *counts = tally;

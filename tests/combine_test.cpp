@@ -414,6 +414,10 @@ TEST(Combine, misuse_is_refused_by_name) {
         },
         "estimate: expected a stride");
     refused([&] { combine(engine, all, all, all, {all, {}, nullptr}, {.estimator = Estimator::mean}); }, "estimator");
+    const View wraps{mem.mem(), ~std::uint64_t{0} - 3, 32}, endless{mem.mem(), 0, ~std::uint64_t{0}, 4, 3};
+    refused([&] { combine(engine, half, half, half, {wraps, {}, nullptr}); }, "estimate: expected");
+    refused([&] { combine(engine, endless, endless, endless, {endless, {}, nullptr}); }, "inside its buffer");
+    refused([&] { combine(engine, all, all, all, {all, {}, mem.mem()}); }, "flags: expected a view apart from estimate");
     const std::vector<float> three(3), two(2);
     refused([&] { combine(engine, three, two, 1.0f); }, "t: expected 3 values, got 2");
     refused(

@@ -164,7 +164,15 @@ MomentsOptions with_weights(bool reliability) {
     return o;
 }
 
-/// The largest |got - want| / scale over all values, where scale is of the size of the estimate and its parts.
+/// Estimates come out of at most a dozen float operations on numbers no larger than the estimate and 8 of its errors: 2^-24
+/// each. Slopes of the cross-fit have a bound of their own.
+double allowed(std::span<const Statistics> groups, Estimator e, double tau) {
+    const double size =
+        std::fabs(estimate(groups, Estimator::ratio, tau)) + 8 * standard_error(groups, Estimator::ratio, tau);
+    return 12 * 0x1p-24 * size + (e == Estimator::crossfit_regression ? crossfit_bound(groups, tau) : 0);
+}
+
+/// Over all values: the largest |got - want| over what is allowed, and the largest relative error of the error bar.
 struct Worst {
     double value = 0, error = 0;
 };
@@ -176,9 +184,8 @@ Worst worst_of(const GroupedInput& in, const Combined& out, Estimator e, Estimat
         const double tau = static_cast<double>(taus[i]);
         const double want = estimate(groups, oracle, tau, reliability);
         const double error = standard_error(groups, oracle, tau, reliability);
-        const double size =
-            std::fabs(estimate(groups, Estimator::ratio, tau)) + 8 * standard_error(groups, Estimator::ratio, tau);
-        worst.value = std::max(worst.value, std::fabs(static_cast<double>(out.estimate[i]) - want) / size);
+        const double off = std::fabs(static_cast<double>(out.estimate[i]) - want);
+        worst.value = std::max(worst.value, off / allowed(groups, e, tau));
         if (e != Estimator::mean_of_ratios)
             worst.error = std::max(worst.error, std::fabs(static_cast<double>(out.standard_error[i]) / error - 1));
     }
@@ -187,8 +194,7 @@ Worst worst_of(const GroupedInput& in, const Combined& out, Estimator e, Estimat
 
 }  // namespace
 
-// Estimates come out of at most a dozen float operations on numbers no larger than the estimate and 8 of its errors: 2^-24
-// each. Errors are roots of differences of second moments in two-float, then five float operations: 4 ulp.
+// Errors are roots of differences of second moments in two-float, then five float operations: 4 ulp.
 TEST(Estimator, device_matches_the_reference_in_double) {
     const Engine engine;
     for (const std::uint64_t seed : {1, 2, 3, 4}) {
@@ -198,16 +204,19 @@ TEST(Estimator, device_matches_the_reference_in_double) {
         for (const Estimator e : all_estimators()) {
             const Combined out = combine(s, Tau(std::span<const float>(taus)), all_of(e));
             const Worst worst = worst_of(in, out, e, e, reliability);
-            EXPECT_LE(worst.value, 12 * 0x1p-24) << name_of(e) << " seed " << seed;
+            EXPECT_LE(worst.value, 1) << name_of(e) << " seed " << seed;
             EXPECT_LE(worst.error, 8 * 0x1p-24) << name_of(e) << " seed " << seed;
             if (e == Estimator::ratio) continue;
-            EXPECT_GT(worst_of(in, out, e, Estimator::ratio, reliability).value, 12 * 0x1p-24)
+            EXPECT_GT(worst_of(in, out, e, Estimator::ratio, reliability).value, 1)
                 << "planted fault: the ratio in place of " << name_of(e);
+            if (e != Estimator::hartley_ross) continue;
+            EXPECT_GT(worst_of(in, out, e, Estimator::ratio, reliability).error, 8 * 0x1p-24)
+                << "planted fault: the error bar of the ratio";
         }
         for (const Estimator e : {Estimator::beale, Estimator::tin}) {
             const Combined out = combine(s, Tau(std::span<const float>(taus)), all_of(e));
             const Worst other = worst_of(in, out, e, e, !reliability);
-            EXPECT_GT(other.value, 12 * 0x1p-24) << "planted fault: weights of the other kind";
+            EXPECT_GT(other.value, 1) << "planted fault: weights of the other kind";
             EXPECT_GT(other.error, 8 * 0x1p-24) << "planted fault: weights of the other kind";
         }
     }
@@ -306,8 +315,8 @@ TEST(Estimator, device_has_the_twins_bits_at_every_shape) {
                 return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b);
             };
             for (std::size_t i = 0; i < values; ++i) {
-                const double k = i == 9 || i == 300 ? 10 : 11;
-                const auto q = static_cast<float>(student_quantile(0.95, k - (regresses ? 2 : 1)));
+                const auto trials = device::clr_trials(join_twin(twin[i], taus[i], ask), taus[i], ask);
+                const auto q = static_cast<float>(student_quantile(0.95, trials - (regresses ? 2.0 : 1.0)));
                 const auto want = read_twin(twin[i], taus[i], ask, q);
                 differ += !same(out.estimate[i], want.value) || !same(out.bias[i], want.bias) ||
                           !same(out.lower[i], want.lower) || !same(out.upper[i], want.upper) ||

@@ -185,23 +185,6 @@ device::clr_question asks_crossfit() {
     return ask;
 }
 
-/// How far the twin may be from the cross-fitted regression in double: groups.h bounds each slope.
-double crossfit_bound(std::span<const Statistics> groups, double tau) {
-    Statistics all;
-    for (const auto& g : groups) all.merge(g);
-    double bound = 16 * 0x1p-24 * std::fabs(all.mean_m);
-    for (const auto& g : groups) {
-        Statistics rest;
-        for (const auto& other : groups)
-            if (&other != &g) rest.merge(other);
-        if (!(rest.m2_t > 0)) continue;
-        const double moved = g.weight / all.weight * std::fabs(g.mean_t - tau);
-        const double root = std::sqrt(rest.m2_m / rest.m2_t), slope = std::fabs(rest.c_mt / rest.m2_t);
-        bound += moved * ((group_count + 2) * 0x1p-14 * root + 16 * 0x1p-24 * slope);
-    }
-    return bound;
-}
-
 /// Without asking the other groups where sums cancel.
 float trusting_crossfit(std::span<const TwinValue> groups, float tau) {
     using namespace device;
@@ -234,6 +217,49 @@ TEST(Groups, crossfit_holds_its_bound_where_one_batch_outweighs_all_others) {
             caught += std::fabs(static_cast<double>(trusting_crossfit(groups, tau)) - exact) > bound;
         }
         EXPECT_GT(caught, static_cast<int>(values / 20)) << "planted fault: slopes in doubt are taken, " << batches;
+    }
+}
+
+namespace {
+
+/// t varies by a few of its own ulps: most of a second moment's hi part may be what its lo part takes back.
+GroupedInput of_almost_constant_t(std::size_t batches) {
+    Samples draw(8);
+    GroupedInput in;
+    for (std::size_t k = 0; k < batches; ++k) {
+        in.t.push_back(floats(values, [&] { return 1 + 1e-6 * draw.normal(); }));
+        in.m.push_back(floats(values, [&] { return 0.5 + 0.1 * draw.normal(); }));
+        in.weight.push_back(1);
+    }
+    return in;
+}
+
+/// The slopes' sums out of hi parts alone.
+std::vector<TwinValue> without_lo_parts(std::vector<TwinValue> groups) {
+    for (auto& g : groups)
+        for (device::clr_two* sum : {&g.record.moments.mm, &g.record.moments.tt, &g.record.moments.mt}) sum->lo = 0;
+    return groups;
+}
+
+}  // namespace
+
+TEST(Groups, crossfit_holds_its_bound_where_t_hardly_varies) {
+    const float tau = 1.3f;
+    for (const std::size_t batches : {11, 17, 23}) {
+        const GroupedInput in = of_almost_constant_t(batches);
+        int caught = 0;
+        for (std::size_t i = 0; i < values; ++i) {
+            const auto want = reference(in, i);
+            const auto groups = twins(in, i);
+            const double exact = estimate(want, Estimator::crossfit_regression, static_cast<double>(tau));
+            const double bound = crossfit_bound(want, static_cast<double>(tau));
+            const auto off = [&](const std::vector<TwinValue>& read) {
+                return std::fabs(static_cast<double>(read_twin(read, tau, asks_crossfit()).value) - exact);
+            };
+            EXPECT_LE(off(groups), bound) << batches << " batches, value " << i;
+            caught += off(without_lo_parts(groups)) > bound;
+        }
+        EXPECT_GT(caught, 0) << "planted fault: hi parts alone, " << batches;
     }
 }
 

@@ -54,7 +54,7 @@ enum class IntervalKind : std::uint32_t {
 };
 
 /// Student's quantile of a two-sided interval: P(|T| <= q) = level. Errors: InvalidArgument unless 0 < level < 1 and
-/// freedom > 0.
+/// freedom >= .5.
 double student_quantile(double level, double freedom);
 
 /// Moments of one value in double: the definition that the device's float states are tested against, and the way to check a
@@ -80,7 +80,10 @@ struct Interval {
 /// An estimator that needs more than there is gives NaN: this reference falls back to nothing. `reliability`, here and
 /// below: weights are not sample counts, as Statistics::scale.
 double estimate(std::span<const Statistics> groups, Estimator estimator, double tau, bool reliability = false);
-/// The standard error as combine() defines it; +inf below two batches (regressions: three), NaN for the mean of ratios.
+/// The standard error as combine() defines it: sqrt(M2 / ((K - 1) W)), the M2 of m for the mean, of m - mean(m / t) t for
+/// Hartley and Ross, of m about its line on t for the regressions (K - 2 for K - 1), else of m - mean(m) / mean(t) t, times
+/// tau / mean(t). The jackknife has one of its groups' pseudo-values. +inf below two batches (regressions: three), NaN for
+/// the mean of ratios.
 double standard_error(std::span<const Statistics> groups, Estimator estimator, double tau, bool reliability = false);
 /// Of the ratio, to first order: (R Var(t) / t^2 - tau Cov / t^2) of the means.
 double bias_of_ratio(const Statistics& all, double tau, bool reliability = false);

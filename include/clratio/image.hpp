@@ -38,7 +38,8 @@ public:
     int height() const { return data_window.y1 - data_window.y0 + 1; }
     std::uint64_t size() const { return values.size(); }
     operator std::span<const float>() const { return values; }
-    operator Tau() const { return Tau(std::span<const float>(values)); }
+    operator Tau() const& { return Tau(std::span<const float>(values)); }
+    operator Tau() && { return Tau::owning(std::move(values)); }  ///< the image's values are given away
 };
 
 /// Reads half, float or uint; Y, RGB, RGBA or named channels; scanline, tiled or multi-part; any compression.

@@ -53,7 +53,8 @@ struct HostBatch {
 };
 
 /// The device buffers of a state. Each lies in tiles of 32 values: for each group 32 float32 hi parts, then 32 lo parts; a
-/// value is hi + lo, where hi may be some ulps off the nearest float. `batches` has 32 uint32 for each group instead. weight
+/// value is hi + lo. hi need not be the nearest float: between the batches that settle, every eighth, lo may be several
+/// percent of it. `batches` has 32 uint32 for each group instead. weight
 /// and batches exist with NonFinite::skip, weight2 if Weights::reliability is set besides, the last three with `ratios`;
 /// they are null otherwise.
 struct StatePlanes {

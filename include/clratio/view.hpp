@@ -23,6 +23,14 @@ struct View {
     std::uint32_t stride = 1;
     std::uint32_t channels = 1;
 
+    /// Whether all that the view touches lies in so many elements, for any offset, count and stride.
+    bool fits(std::uint64_t elements) const {
+        if (count == 0 || channels == 0) return offset <= elements;
+        if (stride != 0 && (count - 1) / channels > elements / stride) return false;
+        const std::uint64_t length = View{mem, 0, count, stride, channels}.end();
+        return length <= elements && offset <= elements - length;
+    }
+
     /// One past the last element the view touches.
     std::uint64_t end() const {
         if (count == 0) return offset;

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "clratio/combine.hpp"
@@ -70,6 +71,23 @@ inline std::vector<TwinValue> twins(const GroupedInput& in, std::size_t value) {
     std::vector<TwinValue> groups(group_count);
     for (std::size_t k = 0; k < in.m.size(); ++k) groups[k % group_count].add(in.m[k][value], in.t[k][value], in.weight[k]);
     return groups;
+}
+
+/// How far device and twin may be from the cross-fitted regression in double: groups.h bounds each slope.
+inline double crossfit_bound(std::span<const Statistics> groups, double tau) {
+    Statistics all;
+    for (const auto& g : groups) all.merge(g);
+    double bound = 16 * 0x1p-24 * std::fabs(all.mean_m);
+    for (const auto& g : groups) {
+        Statistics rest;
+        for (const auto& other : groups)
+            if (&other != &g) rest.merge(other);
+        if (!(rest.m2_t > 0)) continue;
+        const double moved = g.weight / all.weight * std::fabs(g.mean_t - tau);
+        const double root = std::sqrt(rest.m2_m / rest.m2_t), slope = std::fabs(rest.c_mt / rest.m2_t);
+        bound += moved * ((group_count + 2) * 0x1p-14 * root + 16 * 0x1p-24 * slope);
+    }
+    return bound;
 }
 
 }  // namespace clratio::test

@@ -84,8 +84,11 @@ CLR_FN clr_evidence clr_evidence_of(clr_uint batches, clr_two weight, clr_two we
     n.few = batches < (clr_uint)(2u);
     clr_real divisor = clr_to_real(batches - (clr_uint)(1u)) * weight.hi, numerator = one;
     if (reliability) {
-        divisor = weight.hi * clr_two_subtract(clr_two_multiply(weight, weight), weight2).hi;
-        numerator = weight2.hi;
+        // W2 / (W (W^2 - W2)) without third powers, which would leave the range of float long before the weights do.
+        const clr_mask none = !(weight.hi > zero);
+        const clr_two mean = clr_two_divide(weight2, clr_two_make(none ? one : weight.hi, none ? zero : weight.lo));
+        divisor = weight.hi * clr_two_subtract(weight, mean).hi;
+        numerator = mean.hi;
     }
     n.few = n.few || !(divisor > zero);
     n.scale = n.few ? zero : numerator / (n.few ? one : divisor);
@@ -97,7 +100,7 @@ CLR_FN clr_mask clr_always(void) { return (clr_real)(0.0f) < (clr_real)(1.0f); }
 
 CLR_FN clr_real clr_root(clr_real x) {
     const clr_real zero = (clr_real)(0.0f);
-    return clr_sqrt(x > zero ? x : x * zero);
+    return clr_sqrt(x > zero ? x : clr_abs(x) * zero);
 }
 
 CLR_FN clr_real clr_slope(clr_quotient q) { return q.empty ? (clr_real)(1.0f) : clr_abs(q.control * q.inverse); }
@@ -121,6 +124,13 @@ CLR_FN clr_real clr_hartley_ross(clr_record r, clr_real tau) {
     const clr_two rest = clr_two_subtract(r.moments.m, product);
     const clr_real k = clr_to_real(r.batches);
     return clr_fma(tau, r.ratios.quotient.hi, rest.hi * (k / (k - (clr_real)(1.0f))));
+}
+
+// Of the residual m - r t with r the mean of m / t, which is how Hartley and Ross's estimate varies: the spread about the
+// ratio, moved to r.
+CLR_FN clr_real clr_hartley_ross_error(clr_record r, clr_quotient q, clr_spread s, clr_evidence n) {
+    const clr_real off = clr_two_gap(r.ratios.quotient, q.quotient);
+    return clr_root(clr_fma(off, clr_fma(off, s.tt, (clr_real)(-2.0f) * s.ratio.mt), s.ratio.mm) * n.scale);
 }
 
 // Eq. (5), tau mean(m / t), with the zero policy for each batch; the plain mean where tau == 0.
@@ -171,11 +181,11 @@ CLR_FN clr_interval clr_delta_interval(clr_real value, clr_real error, clr_real 
 // Fieller 1940, in units of the denominator: (r - g beta -+ sqrt(q^2 V_d - g q^2 V_reg)) / (1 - g), g = q^2 V_t / t^2.
 CLR_FN clr_interval clr_fieller_interval(clr_quotient q, clr_spread s, clr_evidence n, clr_real quantile) {
     const clr_real zero = (clr_real)(0.0f), one = (clr_real)(1.0f);
-    const clr_real factor = (quantile * q.inverse) * (quantile * q.inverse) * n.scale;
+    const clr_real unit = clr_abs(quantile * q.inverse), factor = unit * unit * n.scale;
     const clr_real g = factor * s.tt;
-    const clr_real square = clr_fma(-g, factor * s.line, factor * (s.ratio.mm > zero ? s.ratio.mm : zero));
+    const clr_real square = clr_fma(-g, s.line, s.ratio.mm > zero ? s.ratio.mm : zero) * n.scale;
     const clr_mask open = !(g < one), whole = q.empty || n.few || (open && !(square > zero));
-    const clr_real root = clr_root(square), divisor = g == one ? (clr_real)(0x1p-24f) : one - g;
+    const clr_real root = unit * clr_root(square), divisor = g == one ? (clr_real)(0x1p-24f) : one - g;
     const clr_real middle = clr_fma(-factor, s.mt, q.quotient.hi);
     return clr_interval_make(q.control * ((middle - root) / divisor), q.control * ((middle + root) / divisor), open, whole);
 }
@@ -262,14 +272,22 @@ CLR_FN clr_mask clr_falls_back(clr_joint j, clr_u32 estimator) {
 }
 
 // Where the jackknife has no error of its own.
-CLR_FN clr_mask clr_has_delta_error(clr_joint j) { return j.q.empty || clr_falls_back(j, CLR_ESTIMATOR_JACKKNIFE); }
+CLR_FN clr_mask clr_has_delta_error(clr_joint j, clr_real tau) {
+    return j.q.empty || tau == (clr_real)(0.0f) || clr_falls_back(j, CLR_ESTIMATOR_JACKKNIFE);
+}
+
+// What the quantile of Student's t counts: batches, or the groups that the jackknife's own error is made of.
+CLR_FN clr_uint clr_trials(clr_joint j, clr_real tau, clr_question ask) {
+    if (ask.estimator != CLR_ESTIMATOR_JACKKNIFE || ask.interval != CLR_INTERVAL_DELTA) return j.all.batches;
+    return clr_has_delta_error(j, tau) ? j.all.batches : j.whole.groups;
+}
 
 CLR_FN clr_real clr_delta_error(clr_quotient q, clr_spread s, clr_evidence n) {
     return clr_slope(q) * clr_root(s.ratio.mm * n.scale);
 }
 
 // The standard error of finite data; the delta method's unless the estimator has one of its own.
-CLR_FN clr_real clr_error_of(clr_joint j, clr_mask fallen, clr_u32 estimator) {
+CLR_FN clr_real clr_error_of(clr_joint j, clr_mask fallen, clr_real tau, clr_u32 estimator) {
     const clr_quotient q = j.q;
     const clr_spread s = j.spread;
     const clr_evidence n = j.n;
@@ -281,8 +299,12 @@ CLR_FN clr_real clr_error_of(clr_joint j, clr_mask fallen, clr_u32 estimator) {
         const clr_real loss = few ? (clr_real)(INFINITY) : (k - one) / (few ? one : k - two);
         return fallen ? mean : clr_root(s.line * n.scale * loss);
     }
+    if (estimator == CLR_ESTIMATOR_HARTLEY_ROSS) {
+        const clr_mask ruled = q.empty || tau == (clr_real)(0.0f);
+        return ruled ? clr_delta_error(q, s, n) : clr_hartley_ross_error(j.all, q, s, n);
+    }
     if (estimator != CLR_ESTIMATOR_JACKKNIFE) return clr_delta_error(q, s, n);
-    const clr_mask by_delta = clr_has_delta_error(j);
+    const clr_mask by_delta = clr_has_delta_error(j, tau);
     const clr_real error = clr_jackknife_error(q, j.folds, j.whole);
     if (!clr_any(by_delta)) return error;
     return by_delta ? clr_delta_error(q, s, n) : error;
@@ -291,7 +313,7 @@ CLR_FN clr_real clr_error_of(clr_joint j, clr_mask fallen, clr_u32 estimator) {
 // 1 where neither the ratio nor the mean varies.
 CLR_FN clr_real clr_gain_of(clr_spread s) {
     const clr_real zero = (clr_real)(0.0f), one = (clr_real)(1.0f), residual = clr_abs(s.ratio.mm);
-    const clr_mask flat = !(s.mm > zero);
+    const clr_mask flat = s.mm <= zero;
     return flat ? (residual > zero ? (clr_real)(INFINITY) : one) : residual / (flat ? one : s.mm);
 }
 
@@ -301,7 +323,8 @@ CLR_FN clr_real clr_needed_of(clr_real value, clr_real error, clr_evidence n, cl
     const clr_real target = relative > fixed ? relative : fixed;
     const clr_real excess = error / target;
     const clr_real more = clr_to_real(n.batches) * clr_fma(excess, excess, -one);
-    return error <= target ? zero : (more < one ? one : more);
+    const clr_mask known = clr_is_finite(error) && clr_is_finite(value);
+    return known ? (error <= target ? zero : (more < one ? one : more)) : (clr_real)(INFINITY);
 }
 
 // Any of the estimators, with all flags. `added`: batches that were offered to the state; quantile: of the interval. Only
@@ -327,7 +350,7 @@ CLR_FN clr_estimate clr_read_out(clr_joint j, clr_u32 added, clr_real tau, clr_r
     const clr_mask unknown = averages ? clr_always() : n.few || replaced || too_few;
     e.error = unknown ? infinite : zero;
     if (ask.outputs & (CLR_WRITE_ERROR | CLR_WRITE_INTERVAL | CLR_WRITE_NEEDED)) {
-        const clr_real error = clr_error_of(j, fallen, ask.estimator);
+        const clr_real error = clr_error_of(j, fallen, tau, ask.estimator);
         e.error = unknown ? infinite : error;
     }
     e.bias = e.lower = e.upper = e.gain = e.needed = zero;

@@ -203,10 +203,11 @@ typedef struct {
 CLR_FN clr_others clr_others_than(clr_cross c, clr_moments within, clr_moments group, clr_part w) {
     const clr_real dm = clr_two_gap(group.m, within.m), dt = clr_two_gap(group.t, within.t);
     const clr_real heavy_m = w.apart * dm, heavy_t = w.apart * dt;
-    const clr_real tt = clr_fma(-heavy_t, dt, c.tt - group.tt.hi), mt = clr_fma(-heavy_t, dm, c.mt - group.mt.hi);
+    const clr_real tt = clr_fma(-heavy_t, dt, c.tt - clr_two_nearest(group.tt));
+    const clr_real mt = clr_fma(-heavy_t, dm, c.mt - clr_two_nearest(group.mt));
     clr_others o;
     o.slope = clr_slope_of_regression(mt, tt);
-    o.margin_m = clr_fma(-heavy_m, dm, c.spare_m - group.mm.hi);
+    o.margin_m = clr_fma(-heavy_m, dm, c.spare_m - clr_two_nearest(group.mm));
     o.margin_t = tt - c.least_t;
     return o;
 }
@@ -253,8 +254,8 @@ CLR_FN clr_rest clr_rest_center(clr_rest r) {
 CLR_FN clr_rest clr_rest_scatter(clr_rest r, clr_moments group, clr_real weight) {
     const clr_real dm = clr_two_beyond(group.m, r.near_m) - r.m, dt = clr_two_beyond(group.t, r.near_t) - r.t;
     const clr_real heavy = weight * dt;
-    r.tt = clr_fma(heavy, dt, r.tt + group.tt.hi);
-    r.mt = clr_fma(heavy, dm, r.mt + group.mt.hi);
+    r.tt = clr_fma(heavy, dt, r.tt + clr_two_nearest(group.tt));
+    r.mt = clr_fma(heavy, dm, r.mt + clr_two_nearest(group.mt));
     return r;
 }
 
@@ -271,7 +272,7 @@ CLR_FN clr_others clr_settle_doubt(clr_others o, clr_rest r) {
 
 CLR_FN clr_mask clr_is_untold(clr_others o, clr_rest r) {
     const clr_real zero = (clr_real)(0.0f);
-    return o.margin_t < zero && !(r.tt > zero);
+    return o.margin_t < zero && r.tt <= zero;
 }
 
 // M2 about the line, after the third pass.
@@ -288,6 +289,7 @@ CLR_FN clr_spread clr_spread_of_groups(clr_moments within, clr_two ratio, clr_fo
     d.mt = within.mt.hi + f.between.mt;
     d.ratio.mm = inner.mm + f.between.ratio.mm;
     d.ratio.mt = inner.mt + f.between.ratio.mt;
+    d.ratio = clr_without_noise(d.ratio, d.mm, d.tt, ratio.hi);
     d.line = (clr_real)(0.0f);
     return d;
 }

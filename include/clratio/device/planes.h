@@ -275,12 +275,12 @@ typedef struct {
     global float *estimate, *error, *bias, *lower, *upper, *kind, *gain, *needed, *flags;
 } clr_outputs;
 
-// The interval's quantile for each value's own number of batches; beyond the table, that of the whole state.
-CLR_FN clr_real clr_quantile_for(clr_uint batches, clr_reading reading, global const float* quantiles) {
+// The interval's quantile for each value's own number of trials; beyond the table, that of the whole state.
+CLR_FN clr_real clr_quantile_for(clr_uint trials, clr_reading reading, global const float* quantiles) {
     if (reading.quantiles == 0) return (clr_real)(reading.quantile);
     uint count[CLR_WIDTH];
     float lane[CLR_WIDTH];
-    clr_store(batches, count);
+    clr_store(trials, count);
     for (int i = 0; i < CLR_WIDTH; ++i) lane[i] = count[i] < reading.quantiles ? quantiles[count[i]] : reading.quantile;
     return clr_load(lane);
 }

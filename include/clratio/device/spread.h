@@ -33,10 +33,19 @@ CLR_FN clr_residual clr_residual_of(clr_moments s, clr_two r) {
     return d;
 }
 
-// Of m on t; 0 where t does not vary.
+// Of m on t; 0 where t does not vary, NaN where either sum is out of range.
 CLR_FN clr_real clr_slope_of_regression(clr_real mt, clr_real tt) {
     const clr_real zero = (clr_real)(0.0f);
-    return tt > zero ? mt / tt : zero;
+    return tt <= zero ? zero : mt / tt;
+}
+
+// Of second moments about the ratio what is less than this part of m's and r t's own is rounding, and counts as 0.
+#define CLR_LEAST_RESIDUAL 0x1p-40f
+
+CLR_FN clr_residual clr_without_noise(clr_residual d, clr_real mm, clr_real tt, clr_real r) {
+    const clr_real part = clr_fma(r, r * tt, mm) * (clr_real)(CLR_LEAST_RESIDUAL);
+    d.mm = d.mm <= part ? (clr_real)(0.0f) : d.mm;
+    return d;
 }
 
 // M2 about the line of this slope. It is least for the regression's own: a slope rounded to float costs 2^-48 of mm.
@@ -50,7 +59,7 @@ CLR_FN clr_spread clr_spread_of(clr_moments s, clr_two ratio) {
     d.mm = s.mm.hi;
     d.tt = s.tt.hi;
     d.mt = s.mt.hi;
-    d.ratio = clr_residual_of(s, ratio);
+    d.ratio = clr_without_noise(clr_residual_of(s, ratio), d.mm, d.tt, ratio.hi);
     d.line = clr_line_residual(s, clr_slope_of_regression(d.mt, d.tt));
     return d;
 }
