@@ -1,11 +1,14 @@
 #define CL_USE_DEPRECATED_OPENCL_1_2_APIS  // clCreateCommandQueue: all that an OpenCL 1.2 device has
 #include "clratio/engine.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
 #include <cctype>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
 
 #include "clratio/device/portable.h"
 #include "engine_state.hpp"
@@ -17,6 +20,28 @@ namespace {
 constexpr auto no_platform = "No OpenCL platform: install one for the CPU with 'apt install pocl-opencl-icd', or your GPU "
                              "vendor's; drivers are looked for through the .icd files in /etc/OpenCL/vendors (or "
                              "$OCL_ICD_VENDORS)";
+
+/// PoCL offers no platform where it has no place for the kernels that it builds: that folder, or nothing.
+std::string unwritable_pocl_cache() {
+    namespace fs = std::filesystem;
+    fs::path folder;
+    for (const auto& [variable, below] :
+         {std::pair{"POCL_CACHE_DIR", ""}, {"XDG_CACHE_HOME", "pocl"}, {"HOME", ".cache/pocl"}})
+        if (const char* value = std::getenv(variable); folder.empty() && value && *value) folder = fs::path(value) / below;
+    fs::path there = folder;
+    std::error_code error;
+    while (there.has_relative_path() && !fs::exists(there, error)) there = there.parent_path();
+    return folder.empty() || access(there.c_str(), W_OK) == 0 ? "" : folder.string();
+}
+
+DeviceError no_devices() {
+    const std::string cache = unwritable_pocl_cache();
+    std::string why = no_platform;
+    if (!cache.empty())
+        why += ". If it is PoCL and installed: it does not start, as it cannot keep its kernels in " + cache +
+               "; POCL_CACHE_DIR names another folder";
+    return {"clGetPlatformIDs", -1001, why};
+}
 
 struct Found {
     cl_platform_id platform;
@@ -97,17 +122,19 @@ bool matches(const Found& f, const std::string& wish) {
 
 std::string ids(const std::vector<Found>& found) {
     std::string s;
-    for (const auto& f : found) s += (s.empty() ? "" : ", ") + f.info.id + " (" + f.info.name + ")";
+    for (const auto& f : found)
+        s += (s.empty() ? "" : ", ") + f.info.id + (is(f, CL_DEVICE_TYPE_GPU) ? " (gpu, " : " (cpu, ") + f.info.name + ")";
     return s;
 }
 
 std::pair<Found, std::string> pick() {
     const auto found = find_devices();
-    if (found.empty()) throw DeviceError("clGetPlatformIDs", -1001, no_platform);
+    if (found.empty()) throw no_devices();
     if (const char* wish = std::getenv("CLRATIO_DEVICE"); wish && *wish) {
         const auto f = std::find_if(found.begin(), found.end(), [&](const Found& x) { return matches(x, lower(wish)); });
         if (f == found.end())
-            throw InvalidArgument("CLRATIO_DEVICE", "'cpu', 'gpu', a part of a name, or one of " + ids(found), wish);
+            throw InvalidArgument("CLRATIO_DEVICE", "a kind, an id or a part of the name of what is there: " + ids(found),
+                                  wish);
         return {*f, std::string("CLRATIO_DEVICE=") + wish};
     }
     const auto first = [&](cl_device_type type) {

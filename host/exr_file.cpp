@@ -3,6 +3,10 @@
 #include <ImfChannelList.h>
 #include <ImfTestFile.h>
 
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <set>
 #include <stdexcept>
@@ -51,6 +55,7 @@ void require_exr(const std::string& path) {
     if (const auto status = fs::status(path); !fs::exists(status)) throw std::runtime_error("no such file");
     if (fs::is_directory(path)) throw std::runtime_error("is a folder");
     if (!fs::is_regular_file(path)) throw std::runtime_error("is not a regular file");
+    if (access(path.c_str(), R_OK) != 0) throw std::runtime_error(std::string("cannot be read: ") + std::strerror(errno));
     if (!Imf::isOpenExrFile(path.c_str())) throw std::runtime_error("cannot be opened, or is not an OpenEXR file");
 }
 

@@ -73,9 +73,12 @@ TEST(FixedTool, sums_refuse_what_they_cannot_keep) {
     expect_refused(add + fixed + Words{"--weight", "1.5"}, 2, "whole numbers from 1 on, got 1.5");
     expect_refused(add + fixed + Words{"--range", "25"}, 2, "16 to 48 bits together, got 49");
     expect_refused(add + Words{"--state", state, "--range", "8"}, 2, "--range requires --fixed");
-    expect_refused(add + fixed + Words{"--weight", "8388608"}, 1, "weight: expected a sum of at most 8388607");
+    expect_refused(add + fixed + Words{"--weight", "8388608"}, 2, "--weight: the batches have 8388608 samples");
     EXPECT_FALSE(std::filesystem::exists(state));
     answer(add + fixed);
+    const Words full = batches.combine(0, 2) + Words{"--resume", "--state", state, "--weight", "1", "8388607"};
+    expect_refused(full, 1, "its --weight 8388607 brings the sum to 8388608");
+    EXPECT_EQ(inspect_state(state).ranges.text(), "[0,1)") << "the batch before is kept";
     answer(add + Words{"--state", two});
     const Words on = batches.combine(0, 2) + Words{"--resume", "--state"};
     expect_refused(on + Words{state, "--fixed", "20"}, 2,

@@ -499,7 +499,11 @@ TEST(Tool, devices_says_which_and_why) {
     EXPECT_TRUE(j["self_test"]);
     expect_in("would be picked: CLRATIO_DEVICE=cpu",
               clratio_tool({"devices"}, {.environment = {{"CLRATIO_DEVICE", "cpu"}}}).out);
-    expect_refused({"devices"}, 1, "abacus", {.environment = {{"CLRATIO_DEVICE", "abacus"}}});
+    const Said none = clratio_tool({"devices"}, {.environment = {{"CLRATIO_DEVICE", "abacus"}}});
+    EXPECT_EQ(none.code, 1);
+    expect_in("got abacus", none.err);
+    for (const auto& d : list_devices()) expect_in(d.name, none.out);
+    expect_refused({"devices", "--json"}, 1, "abacus", {.environment = {{"CLRATIO_DEVICE", "abacus"}}});
 }
 
 TEST(Tool, without_a_platform_it_names_the_package_and_the_folder) {

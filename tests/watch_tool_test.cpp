@@ -163,3 +163,21 @@ TEST(WatchTool, refuses_what_it_cannot_number) {
     expect_refused(batches.combine(0, 1) + Words{"--tau", "1", "-o", scratch / "o.exr", "--until-batches", "3"}, 2,
                    "--until-batches requires --watch");
 }
+
+TEST(WatchTool, refuses_outputs_that_it_would_take_for_batches_and_files_that_are_missing) {
+    const Batches batches(1);
+    const Renderer renderer(batches);
+    renderer.write_at_once(0);
+    const std::string before = bytes_of(renderer / "m_0.exr");
+    const Words watch = {"combine", "--watch", renderer / "",     "--m", "m_*.exr",  "--t", "t_*.exr",
+                         "--tau",   "1",       "--until-batches", "1",   "--settle", "0"};
+    for (const char* name : {"m_0.exr", "t_7.exr"})
+        expect_refused(watch + Words{"-o", renderer / name}, 2, "an output that --watch would take for a batch");
+    expect_refused(watch + Words{"-o", renderer / "out.exr", "--stderr", renderer / "m_1.exr"}, 2, "m_1.exr: an output");
+    EXPECT_EQ(bytes_of(renderer / "m_0.exr"), before);
+    expect_refused(watch + Words{"-o", renderer / "out.exr", "--reference", renderer / "none.exr"}, 1, "none.exr: no such");
+    expect_refused({"combine", "--watch", renderer / "", "--m", "m_*.exr", "--t", "m_*.exr", "--tau", "1", "-o", "o.exr"}, 2,
+                   "m_*.exr: the pattern of --m, and of --t");
+    expect_refused(watch + Words{"-o", renderer / "out.exr", "--settle", "nan"}, 2, "--settle: expected seconds");
+    EXPECT_EQ(clratio_tool(watch + Words{"-o", renderer / "m_mean.exr"}).code, 0) << "planted fault: any name is refused";
+}

@@ -52,9 +52,6 @@ CombineOptions plain_mean(const CombineOptions& options) {
 Moments moments_of(const Moments& state) { return state; }
 Moments moments_of(const FixedMoments& state) { return state.moments(); }
 
-std::uint64_t outside(const Moments&) { return 0; }
-std::uint64_t outside(const FixedMoments& state) { return state.outside(); }
-
 }  // namespace
 
 Sums sums_of(const clratio::Snapshot& snapshot) {
@@ -95,6 +92,13 @@ clratio::Snapshot Bands::snapshot() const {
     return all;
 }
 
+std::uint64_t Bands::outside() const {
+    std::uint64_t sum = 0;
+    for (const State& state : states_)
+        if (const auto* fixed = std::get_if<FixedMoments>(&state)) sum += fixed->outside();
+    return sum;
+}
+
 std::vector<HostBatch> Bands::slices(std::uint64_t band, std::span<const HostBatch> batches) const {
     std::vector<HostBatch> out;
     for (const auto& b : batches)
@@ -124,7 +128,6 @@ ReadOut Bands::read_out(const Tau& tau, const Wanted& wanted) const {
             append(out.mean, mean);
         }
         out.chosen.negatives += std::visit([](const auto& s) { return s.negatives(); }, states_[band]);
-        out.outside += std::visit([](const auto& s) { return outside(s); }, states_[band]);
     }
     return out;
 }

@@ -18,7 +18,6 @@ struct Wanted {
 
 struct ReadOut {
     clratio::Combined chosen, mean;
-    std::uint64_t outside = 0;  ///< finite values of batches that fixed point could not hold
 };
 
 /// What is kept of the batches. Whole numbers, where `fixed` says so, know neither groups nor ratios nor reliability.
@@ -44,6 +43,8 @@ public:
     void add(std::span<const clratio::HostBatch> batches);
     /// Of what was added.
     ReadOut read_out(const clratio::Tau& tau, const Wanted& wanted) const;
+    /// Finite values, of batches added since the sums were begun or taken up, that fixed point could not hold.
+    std::uint64_t outside() const;
     /// What was added, as one state of the whole image.
     clratio::Snapshot snapshot() const;
 

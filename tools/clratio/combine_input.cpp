@@ -8,6 +8,15 @@
 #include <cmath>
 
 namespace tool::combining {
+
+std::optional<float> tau_number(const std::string& text) {
+    float value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error == std::errc::invalid_argument || end != text.data() + text.size()) return std::nullopt;
+    if (error != std::errc() || !std::isfinite(value)) throw UsageError("--tau: expected a finite number, got " + text);
+    return value;
+}
+
 namespace {
 
 constexpr std::size_t most_in_a_launch = 8;
@@ -21,18 +30,10 @@ std::vector<std::string> interleaved(const std::vector<Job>& jobs) {
     return all;
 }
 
-std::optional<float> number(const std::string& text) {
-    float value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error == std::errc::invalid_argument || end != text.data() + text.size()) return std::nullopt;
-    if (error != std::errc() || !std::isfinite(value)) throw UsageError("--tau: expected a finite number, got " + text);
-    return value;
-}
-
 std::vector<float> numbers(const std::vector<std::string>& words) {
     std::vector<float> all;
     for (const auto& text : words)
-        if (const auto value = number(text)) all.push_back(*value);
+        if (const auto value = tau_number(text)) all.push_back(*value);
     if (!all.empty() && all.size() != words.size()) throw UsageError("--tau: either numbers or files, not both");
     return all;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -45,6 +46,9 @@ private:
 
 /// How many pairs of this size one launch may take.
 std::size_t pairs_in_a_launch(const clratio::Image& image);
+
+/// A word of --tau that is a number, not a file. UsageError where it is not finite.
+std::optional<float> tau_number(const std::string& word);
 
 /// IoError with row, column and channel of the first NaN or infinity.
 void require_finite(const clratio::Image& image);

@@ -7,6 +7,7 @@
 #include "clratio/state.hpp"
 #include "command.hpp"
 #include "output_file.hpp"
+#include "watch_folder.hpp"
 
 namespace tool::combining {
 namespace {
@@ -37,7 +38,7 @@ Where tau is 0 the value is mean(m) / (mean(t) + 1).
 A NaN or an infinity in a batch (--nonfinite):
   skip            that batch does not count for that value (default)
   propagate       the value becomes NaN
-  fail            nothing is written; the file and pixel are named, exit code 1
+  fail            no output is written, and --state ends with the batch before; the file and pixel are named, exit code 1
 
 Files: half, float or uint EXR; scanline, tiled or multi-part; all of one size, window and channels. FILE:LAYER names a
 layer in one file, --layer one for all; with one colour layer in the file it is found without asking. Alpha is taken
@@ -52,8 +53,8 @@ and need not be bounded; --kind, a UINT, says what the two numbers mean: 0 betwe
 2 everything. --method delta is the estimate -+ a multiple of its standard error, too narrow with few batches.
 --gain: the variance of the ratio over that of the plain mean, as the batches predict it: below 1 the ratio pays.
 --bias: of the ratio, as the batches predict it. --needed: how many more batches until the standard error is below --target
-(in units of m) or --relative-target (of the estimate); 0 where it is, inf where nothing is known. Where all batches agree
-it is 0 too, which is no proof: flag 128.
+(in units of m) or --relative-target (of the estimate), or below the larger of both; 0 where it is, inf where nothing is
+known; else a number that need not be whole. Where all batches agree it is 0 too, which is no proof: flag 128.
 
 --weight: how many samples each batch is the mean of (or one number for all). --weights reliability takes them as trust
 instead: then all batches have the same variance, and error bars come out accordingly.
@@ -112,8 +113,9 @@ std::vector<std::string> outputs(const Options& options) {
 
 void require_counts(const Options& options) {
     if (options.m.size() != options.t.size())
-        throw UsageError(fmt::format("batch k of --m belongs to batch k of --t, but --m has {} files and --t has {}",
-                                     options.m.size(), options.t.size()));
+        throw UsageError(fmt::format("batch k of --m belongs to batch k of --t, whatever the estimator, but --m has {} "
+                                     "file{} and --t has {}",
+                                     options.m.size(), options.m.size() == 1 ? "" : "s", options.t.size()));
 }
 
 bool is_missing(const std::string& file) {
@@ -134,15 +136,6 @@ std::vector<std::string> inputs(const Options& options) {
     return files;
 }
 
-bool is_state(const std::string& file) {
-    try {
-        clratio::inspect_state(file);
-        return true;
-    } catch (const clratio::Error&) {
-        return false;
-    }
-}
-
 std::set<std::filesystem::path> identities_of(const std::vector<std::string>& files) {
     std::set<std::filesystem::path> all;
     for (const auto& file : files) all.insert(identity_of(file));
@@ -156,8 +149,7 @@ void require_different(const Options& options) {
         const auto identity = identity_of(file);
         if (!written.insert(identity).second) throw UsageError(file + ": named for two outputs");
         if (read.contains(identity)) throw UsageError(file + ": an input, and an output");
-        if (file != options.state && is_state(file))
-            throw UsageError(file + ": holds a state, which an image would replace; remove it first");
+        if (file != options.state) require_no_state(file);
     }
 }
 
@@ -189,7 +181,7 @@ void require_error_bar(const Options& options) {
         if (!(target >= 0) || !std::isfinite(target))
             throw UsageError(fmt::format("{}: expected a number above 0, got {}", name, target));
     if (options.needed.empty() != (options.target <= 0 && options.relative_target <= 0))
-        throw UsageError("--needed goes with --target or --relative-target");
+        throw UsageError("--needed goes with --target or --relative-target, and they with --needed");
 }
 
 void require_groups(const Options& options) {
@@ -197,6 +189,15 @@ void require_groups(const Options& options) {
         throw UsageError(fmt::format("--groups: expected 1 to {}, got {}", clratio::most_groups, *options.groups));
     if (clratio::needs_of(options.chosen()).groups && options.groups == 1)
         throw UsageError("--estimator " + options.estimator + " needs --groups of at least 2");
+}
+
+/// What a read-out alone does not look at.
+void require_batches_to_add(const Options& options) {
+    if (!options.m.empty()) return;
+    for (const auto& [name, given] : {std::pair{"--weight", !options.weight.empty()},
+                                      {"--first-batch", options.first_batch != 0},
+                                      {"--t", !options.t.empty()}})
+        if (given) throw UsageError(std::string(name) + " is of batches that are added: --m is missing");
 }
 
 void require_weights(const Options& options) {
@@ -224,9 +225,16 @@ void require_fixed(const Options& options) {
     if (bits < sums.least_bits || bits > sums.most_bits)
         throw UsageError(fmt::format("--fixed and --range: expected {} to {} bits together, got {}", sums.least_bits,
                                      sums.most_bits, bits));
-    for (const double w : options.weight)
+    double sum = 0;
+    for (const double w : options.weight) {
         if (w != std::floor(w) || w < 1)
             throw UsageError(fmt::format("--weight: with --fixed whole numbers from 1 on, got {}", w));
+        sum += options.weight.size() == 1 ? w * static_cast<double>(options.m.size()) : w;
+    }
+    if (sum > static_cast<double>(sums.most_weight()))
+        throw UsageError(fmt::format("--weight: the batches have {} samples, --fixed {} --range {} has room for {}; smaller "
+                                     "ones have more",
+                                     sum, sums.resolution, sums.range, sums.most_weight()));
 }
 
 void require_enough(const Options& options) {
@@ -248,6 +256,17 @@ void require_enough(const Options& options) {
         if (given) throw UsageError(std::string(name) + " needs --output: without it batches are added to --state, no more");
 }
 
+/// With --watch they are read when the first batch comes, which may be hours from now.
+void require_side_files(const Options& options) {
+    if (options.watch.empty()) return;
+    std::vector<std::string> files;
+    if (!options.reference.empty()) files.push_back(options.reference);
+    for (const auto& word : options.tau)
+        if (!tau_number(word)) files.push_back(word);
+    for (const auto& spec : files)
+        if (is_missing(without_layer(spec))) throw clratio::IoError(without_layer(spec), "", "no such file");
+}
+
 void require_state(const Options& options) {
     if (options.state.empty() && options.resume) throw UsageError("--resume needs --state, the file to go on with");
     if (!options.state.empty() && !options.resume && std::filesystem::exists(options.state))
@@ -259,6 +278,15 @@ void require_watch(const Options& options) {
     if (options.watch.empty()) return;
     if (options.m.size() != 1 || options.t.size() != 1)
         throw UsageError("--watch takes one pattern for --m and one for --t; quote them, or the shell expands the *");
+    if (options.m == options.t) throw UsageError(options.m.front() + ": the pattern of --m, and of --t");
+    const Pattern patterns[] = {{"--m", options.m.front()}, {"--t", options.t.front()}};
+    const auto watched = identity_of(options.watch);
+    for (const auto& file : outputs(options)) {
+        const auto path = identity_of(file);
+        for (const Pattern& pattern : patterns)
+            if (path.parent_path() == watched && pattern.number(path.filename().string()))
+                throw UsageError(file + ": an output that --watch would take for a batch; choose another name or folder");
+    }
 }
 
 }  // namespace
@@ -344,8 +372,8 @@ void add_options(Command& command, const std::shared_ptr<Options>& o) {
     image("--gain", o->gain, "Write the predicted variance of the ratio over that of the plain mean");
     image("--bias", o->bias, "Write the predicted bias of the ratio");
     image("--needed", o->needed, "Write how many batches are still needed for the target");
-    command.option("--target", o->target, "Standard error to reach, in units of m").type("E");
-    command.option("--relative-target", o->relative_target, "The same, as a share of the estimate").type("R");
+    command.option("--target", o->target, "Standard error to reach, in units of m").type("E").positive();
+    command.option("--relative-target", o->relative_target, "The same, as a share of the estimate").type("R").positive();
     command.option("--stderr", o->standard_error, "Also write the standard error of each value").type("FILE");
     command.option("--flags", o->flags, "Also write the flags of each value").type("FILE");
     command.option("--layer", o->layer, "The layer to read where a file names none").type("NAME");
@@ -361,7 +389,7 @@ void add_options(Command& command, const std::shared_ptr<Options>& o) {
         .shows_default();
     command.option("--checkpoint", o->checkpoint, "Save the state every so many seconds; 0: after each launch")
         .type("SECONDS")
-        .not_negative()
+        .seconds()
         .shows_default()
         .needs(state);
     const auto watch =
@@ -369,7 +397,7 @@ void add_options(Command& command, const std::shared_ptr<Options>& o) {
             .type("DIR");
     command.option("--settle", o->settle, "A file counts when its size and time have stood still for so long")
         .type("SECONDS")
-        .not_negative()
+        .seconds()
         .shows_default()
         .needs(watch);
     command.option("--until-batches", o->until_batches, "End --watch when the sums hold so many batches")
@@ -387,6 +415,7 @@ void add_options(Command& command, const std::shared_ptr<Options>& o) {
 
 void check(const Options& options) {
     require_enough(options);
+    require_batches_to_add(options);
     require_counts(options);
     require_different(options);
     require_inputs_apart(options);
@@ -396,6 +425,7 @@ void check(const Options& options) {
     require_fixed(options);
     require_state(options);
     require_watch(options);
+    require_side_files(options);
     for (const auto& file : outputs(options)) require_place_for(file);
 }
 

@@ -22,6 +22,7 @@ Json json_of(const Options& options, const Report& r) {
                {"any", r.flags.any}}},
              {"negative_inputs", r.negatives},
              {"seconds", {{"decode", r.seconds.decode}, {"device", r.seconds.device}, {"encode", r.seconds.encode}}}};
+    if (options.output.empty()) out["flags"] = out["negative_inputs"] = nullptr;
     if (r.outside) out["outside_range"] = *r.outside;
     if (!options.state.empty())
         out["state"] = {{"file", options.state}, {"ranges", r.ranges}, {"held", r.held}, {"added", r.batches - r.held}};
@@ -56,7 +57,7 @@ void print_flags(const Options& options, const Report& r) {
     line(r.flags.zero_denominator, clratio::needs_of(options.chosen()).ratios
                                        ? "t of some batch is 0"
                                        : "mean t is 0: the zero policy gave the value");
-    line(r.flags.zero_tau, "tau is 0: the impulse guard gave the value");
+    line(r.flags.zero_tau, "tau is 0: the value is mean(m) / (mean(t) + 1)");
     line(r.flags.skipped, r.outside.value_or(0) > 0 ? "a batch was not finite, or outside the range of --fixed, and left out"
                                                     : "a batch was not finite and left out");
     line(r.flags.no_data, "no finite batch: the value is 0");

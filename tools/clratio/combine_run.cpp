@@ -65,13 +65,15 @@ double root_mean_square(const std::vector<float>& errors) {
 /// How many intervals are of each kind, and in how many the reference lies.
 Intervals summary(const clratio::CombinedImage& out, const clratio::Image& reference) {
     Intervals sum;
-    std::uint64_t covered = 0, covered_points = 0;
+    std::uint64_t covered = 0, covered_points = 0, compared = 0, compared_points = 0;
     for (std::size_t i = 0; i < out.kind.size(); ++i) {
         const float lower = out.lower.values[i], upper = out.upper.values[i];
         const bool point = lower == upper && out.kind[i] == CLR_KIND_BOUNDED;
         ++sum.kinds.at(out.kind[i]);
         sum.points += point;
-        if (reference.values.empty()) continue;
+        if (reference.values.empty() || !std::isfinite(reference.values[i])) continue;
+        ++compared;
+        compared_points += point;
         const float x = reference.values[i];
         const bool in = out.kind[i] == CLR_KIND_EXCLUSIVE ? x <= lower || x >= upper : x >= lower && x <= upper;
         covered += in;
@@ -81,8 +83,8 @@ Intervals summary(const clratio::CombinedImage& out, const clratio::Image& refer
         return all == 0 ? 0 : static_cast<double>(part) / static_cast<double>(all);
     };
     if (reference.values.empty()) return sum;
-    sum.coverage = share(covered, out.kind.size());
-    sum.coverage_with_width = share(covered - covered_points, out.kind.size() - sum.points);
+    sum.coverage = share(covered, compared);
+    sum.coverage_with_width = share(covered - covered_points, compared - compared_points);
     return sum;
 }
 
@@ -99,6 +101,7 @@ CombineRun::CombineRun(const Options& options)
     if (const auto sums = keeper_.take_sums()) {
         sums_ = sums_of(*sums);
         bands_.emplace(engine_, *sums, keeper_.shape().channels.size());
+        weight_ = sums->groups.front().weight + sums->groups.front().weight_low;
     }
     report_.nonfinite = name_of(nonfinites, sums_.moments.nonfinite);
     if (bands_) fit_tau();
@@ -107,7 +110,10 @@ CombineRun::CombineRun(const Options& options)
 // What depends on the size of the images: said before the batches are added, not after.
 void CombineRun::fit_tau() {
     if (!options_.output.empty()) tau_.fit(keeper_.shape());
-    if (!reference_file_.done()) reference_ = reference_file_.next_like(keeper_.shape());
+    if (reference_file_.done()) return;
+    reference_ = reference_file_.next_like(keeper_.shape());
+    if (std::none_of(reference_.values.begin(), reference_.values.end(), [](float x) { return std::isfinite(x); }))
+        throw clratio::IoError(reference_.path, reference_.layer, "has no finite value to compare with");
 }
 
 void CombineRun::fit(const Pair& pair) {
@@ -118,9 +124,23 @@ void CombineRun::fit(const Pair& pair) {
 
 void CombineRun::require_fit(const Pair& pair) {
     fit(pair);
-    if (sums_.moments.nonfinite != NonFinite::fail) return;
-    require_finite(pair.m);
-    require_finite(pair.t);
+    if (sums_.moments.nonfinite == NonFinite::fail) {
+        require_finite(pair.m);
+        require_finite(pair.t);
+    }
+    if (sums_.fixed) require_room(pair);
+}
+
+// The library refuses such a batch too, but knows neither its file nor the options.
+void CombineRun::require_room(const Pair& pair) {
+    const double weight = options_.weight_of(pair.index), most = static_cast<double>(sums_.fixed->most_weight());
+    if (weight_ + weight > most)
+        throw clratio::IoError(
+            pair.m.path, pair.m.layer,
+            fmt::format("its --weight {} brings the sum to {}, and sums of --fixed {} --range {} have room "
+                        "for {}; smaller ones have more",
+                        weight, weight_ + weight, sums_.fixed->resolution, sums_.fixed->range, most));
+    weight_ += weight;
 }
 
 CombineRun::Accepted CombineRun::accept(const std::vector<Pair>& pairs) {
@@ -164,7 +184,7 @@ void CombineRun::save() {
 }
 
 std::string CombineRun::how_to_go_on() const {
-    if (options_.state.empty()) return fmt::format("stopped after {} batches", batches());
+    if (options_.state.empty()) return fmt::format("stopped after {} batch{}", batches(), batches() == 1 ? "" : "es");
     if (batches() == 0) return "stopped before the first batch; there is no state to go on with";
     return fmt::format("stopped: {} holds batches {}; the same command with --resume goes on", options_.state,
                        keeper_.ranges().text());
@@ -176,7 +196,6 @@ void CombineRun::read_out() {
 
 void CombineRun::write(ReadOut&& read_out) {
     report_.negatives = read_out.chosen.negatives;
-    if (sums_.fixed) report_.outside = read_out.outside;
     const auto out = clratio::combined_image(std::move(read_out.chosen), keeper_.shape());
     report_.batches = batches();
     report_.ranges = keeper_.ranges().text();
@@ -209,6 +228,7 @@ int CombineRun::report(double decode) {
     report_.shape = keeper_.shape();
     report_.batches = batches();
     report_.ranges = keeper_.ranges().text();
+    if (sums_.fixed && bands_) report_.outside = bands_->outside();
     if (options_.json)
         print(json_of(options_, report_));
     else

@@ -16,7 +16,7 @@ std::string text_of(const Settings& settings) {
     std::string all;
     for (const auto& [name, value] : settings)
         all += (all.empty() ? "" : ", ") + name + " " + (value.empty() ? "(unnamed)" : value);
-    return all;
+    return all.empty() ? "no layer.m and layer.t, which clratio combine records and a program can set" : all;
 }
 
 void require_fitting(const Options& options, const clratio::Snapshot& snapshot) {

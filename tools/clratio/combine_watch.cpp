@@ -84,7 +84,7 @@ private:
     void put_off(const Job& job, const std::string& why) {
         folder_.put_off(job);
         line_.clear();
-        fmt::print(stderr, "clratio: waiting for another version of {}\n", why);
+        fmt::print(stderr, "clratio: batch {} waits for other files: {}\n", job.index, why);
     }
 
     void refresh() {

@@ -2,9 +2,38 @@
 
 #include <CLI/CLI.hpp>
 
+#include <charconv>
+#include <cmath>
 #include <optional>
+#include <type_traits>
+
+#include "tool.hpp"
 
 namespace tool {
+namespace {
+
+/// Refuses a text that is no number in [least, most], NaN included. An empty answer of a CLI11 check is consent.
+template <class T> auto number_between(T least, T most, const std::string& expected) {
+    return [=](const std::string& text) {
+        T value{};
+        const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+        const bool whole = error == std::errc() && end == text.data() + text.size();
+        return whole && value >= least && value <= most ? std::string()
+                                                        : fmt::format("expected {}, got '{}'", expected, text);
+    };
+}
+
+/// CLI11 takes no text for 0, and -1 for the largest whole number.
+template <class T> std::string refuse_misread(const std::string& text) {
+    if (text.empty()) return "expected a number, got nothing";
+    return std::is_unsigned_v<T> && text.front() == '-' ? "expected a whole number from 0 on, got " + text : "";
+}
+
+template <class T> struct Number { using type = T; };
+template <class T> struct Number<std::optional<T>> { using type = T; };
+template <class T> struct Number<std::vector<T>> { using type = T; };
+
+}  // namespace
 
 Option& Option::type(const std::string& name) { return option_->type_name(name), *this; }
 Option& Option::shows_default() { return option_->capture_default_str(), *this; }
@@ -12,9 +41,14 @@ Option& Option::required() { return option_->required(), *this; }
 Option& Option::takes(int values) { return option_->expected(values), *this; }
 Option& Option::commas() { return option_->delimiter(','), *this; }
 Option& Option::one_of(std::vector<std::string> words) { return option_->check(CLI::IsMember(std::move(words))), *this; }
-Option& Option::within(std::uint64_t least, std::uint64_t most) { return option_->check(CLI::Range(least, most)), *this; }
-Option& Option::positive() { return option_->check(CLI::PositiveNumber), *this; }
-Option& Option::not_negative() { return option_->check(CLI::NonNegativeNumber), *this; }
+Option& Option::within(std::uint64_t least, std::uint64_t most) {
+    return option_->check(number_between(least, most, fmt::format("a whole number from {} to {}", least, most))), *this;
+}
+Option& Option::positive() { return option_->check(number_between(1e-37, 1e37, "a number above 0")), *this; }
+Option& Option::seconds() { return option_->check(number_between(0.0, 1e9, "seconds, from 0 on")), *this; }
+Option& Option::between(double least, double most) {
+    return option_->check(number_between(least, most, fmt::format("a number from {} to {}", least, most))), *this;
+}
 Option& Option::excludes(Option other) { return option_->excludes(other.option_), *this; }
 Option& Option::needs(Option other) { return option_->needs(other.option_), *this; }
 Option& Option::tells(bool& given) {
@@ -26,7 +60,10 @@ Command::Command(CLI::App& app, const std::string& name, const std::string& purp
     : app_(app.add_subcommand(name, purpose)) {}
 
 template <class T> Option Command::option(const std::string& names, T& value, const std::string& help) {
-    return Option(app_->add_option(names, value, help));
+    CLI::Option* option = app_->add_option(names, value, help);
+    using Single = typename Number<T>::type;
+    if constexpr (std::is_arithmetic_v<Single>) option->check(refuse_misread<Single>);
+    return Option(option);
 }
 
 template Option Command::option(const std::string&, std::string&, const std::string&);

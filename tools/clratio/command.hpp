@@ -26,7 +26,8 @@ public:
     Option& one_of(std::vector<std::string> words);
     Option& within(std::uint64_t least, std::uint64_t most);
     Option& positive();
-    Option& not_negative();
+    Option& seconds();  ///< not negative
+    Option& between(double least, double most);
     Option& excludes(Option other);
     Option& needs(Option other);
     Option& tells(bool& given);  ///< sets it where the option is there

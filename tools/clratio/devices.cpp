@@ -46,9 +46,20 @@ void print_device(const clratio::DeviceInfo& d, bool picked) {
                yes_no(d.correctly_rounded_divide), yes_no(d.fma));
 }
 
+/// With a CLRATIO_DEVICE that fits none, the list says what would fit.
+clratio::Pick pick_or_list(const Options& options, const std::vector<clratio::DeviceInfo>& all) {
+    try {
+        return clratio::pick_device();
+    } catch (const clratio::InvalidArgument&) {
+        if (!options.json)
+            for (const auto& d : all) print_device(d, false);
+        throw;
+    }
+}
+
 int devices(const Options& options) {
-    const auto pick = clratio::pick_device();
     const auto all = clratio::list_devices();
+    const auto pick = pick_or_list(options, all);
     const bool passed = options.self_test && clratio::Engine{}.self_test();
     if (options.json) {
         Json out{{"devices", Json::array()}, {"picked", pick.device.id}, {"reason", pick.reason}};

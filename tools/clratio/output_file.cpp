@@ -6,8 +6,9 @@
 #include <cstring>
 #include <filesystem>
 
-#include "clratio/exception.hpp"
+#include "clratio/state.hpp"
 #include "output_target.hpp"
+#include "tool.hpp"
 
 namespace tool {
 namespace {
@@ -20,6 +21,7 @@ namespace fs = std::filesystem;
 
 std::string target_of(const std::string& file) {
     require_place_for(file);
+    require_no_state(file);
     return clratio::output_target(file).string();
 }
 
@@ -56,9 +58,21 @@ void require_place_for(const std::string& file) {
     if (fs::exists(there) && !fs::is_regular_file(there)) cannot_write(file, "exists and is not a regular file");
 }
 
+void require_no_state(const std::string& file) {
+    try {
+        clratio::inspect_state(file);
+    } catch (const clratio::Error&) {
+        return;
+    }
+    throw UsageError(file + ": holds a state, which another file would replace; remove it first");
+}
+
 fs::path identity_of(const std::string& file) {
-    std::error_code none;
-    return file.empty() ? fs::path() : fs::weakly_canonical(fs::absolute(file), none);
+    if (file.empty()) return {};
+    const fs::path plain = fs::absolute(file).lexically_normal();
+    std::error_code failed;
+    const fs::path real = fs::weakly_canonical(plain, failed);
+    return failed ? plain : real;
 }
 
 }  // namespace tool

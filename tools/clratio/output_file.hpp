@@ -35,6 +35,9 @@ private:
 /// empty name is none.
 void require_place_for(const std::string& file);
 
+/// UsageError where `file` is a state: whatever replaces it loses batches.
+void require_no_state(const std::string& file);
+
 /// The same for all names that lead to one file, whether it exists or not.
 std::filesystem::path identity_of(const std::string& file);
 

@@ -54,6 +54,7 @@ int picture(const Options& options) {
     if (!options.titles.empty() && options.titles.size() != options.images.size())
         throw UsageError(fmt::format("--titles has {} titles for {} images", options.titles.size(), options.images.size()));
     require_place_for(options.output);
+    require_no_state(options.output);
     const auto output = identity_of(options.output);
     std::vector<clratio::Image> images;
     for (const auto& file : options.images) {
@@ -78,7 +79,10 @@ void add_picture(CLI::App& app, Run& run) {
     Command command(app, "picture", "Put images side by side in one PNG");
     command.option("images", o->images, "Images of one shape, Y or RGB").required().type("FILE");
     command.option("-o,--output", o->output, "The PNG").required().type("OUT.png");
-    command.option("--exposure", o->exposure, "Brighten by this many stops").type("STOPS").shows_default();
+    command.option("--exposure", o->exposure, "Brighten by this many stops")
+        .type("STOPS")
+        .between(-100, 100)
+        .shows_default();
     command.option("--titles", o->titles, "One for each image, with commas between").commas().type("TEXT,...");
     command.option("--layer", o->layer, "The layer to read where a file names none").type("NAME");
     command.footer("Values 0 to 1 get the sRGB transfer curve, others are clipped; a NaN or an infinity is magenta.\n\n"

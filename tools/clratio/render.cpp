@@ -1,6 +1,7 @@
 // clratio render: a scene whose answer is known, as images that clratio combine takes.
 #include <chrono>
 #include <filesystem>
+#include <set>
 
 #include "clratio/image.hpp"
 #include "command.hpp"
@@ -44,6 +45,32 @@ void make_folder(const std::string& folder) {
     if (error) throw clratio::IoError(folder, "", "cannot be made a folder: " + error.message());
 }
 
+/// "m.exr", or with several batches "m_000.exr", ..: in the order of the seeds under the shell's *.
+std::string name_of_batch(char letter, std::uint32_t batch, std::uint32_t batches) {
+    if (batches == 1) return fmt::format("{}.exr", letter);
+    return fmt::format("{}_{:0{}}.exr", letter, batch, std::max<std::size_t>(3, std::to_string(batches - 1).size()));
+}
+
+/// Whether the * of the command that is printed at the end would find this file.
+bool is_of_a_render(const std::string& name) {
+    return name == "m.exr" || name == "t.exr" ||
+           ((name.starts_with("m_") || name.starts_with("t_")) && name.ends_with(".exr"));
+}
+
+/// What an earlier render has left would be combined with what this one writes.
+void require_no_other_batches(const Options& o) {
+    std::set<std::string> written;
+    for (std::uint32_t batch = 0; batch < o.batches; ++batch)
+        for (const char letter : {'m', 't'}) written.insert(name_of_batch(letter, batch, o.batches));
+    for (const auto& entry : std::filesystem::directory_iterator(o.folder)) {
+        const std::string name = entry.path().filename().string();
+        if (is_of_a_render(name) && !written.contains(name))
+            throw clratio::IoError(entry.path().string(), "",
+                                   "is of another render, and would be combined with this one; remove it, or choose "
+                                   "another folder");
+    }
+}
+
 class Writer {
 public:
     Writer(const Options& options, const Plan& plan)
@@ -81,12 +108,6 @@ private:
     std::vector<std::pair<std::string, std::string>> settings_;
     std::vector<std::string> files_;
 };
-
-/// "m.exr", or with several batches "m_000.exr", ..: in the order of the seeds under the shell's *.
-std::string name_of_batch(char letter, std::uint32_t batch, std::uint32_t batches) {
-    if (batches == 1) return fmt::format("{}.exr", letter);
-    return fmt::format("{}_{:0{}}.exr", letter, batch, std::max<std::size_t>(3, std::to_string(batches - 1).size()));
-}
 
 struct Report {
     std::string device;
@@ -147,15 +168,17 @@ void print_report(const Options& o, const Plan& plan, const Report& r) {
     fmt::print("{}\n{} x {} pixels, {} rays hit the medium; {} batches of {} samples, {} {}, seeds {} to {}, on {}\n",
                plan.scene.title, plan.frame.width, plan.frame.height, r.hits, o.batches, o.samples, o.estimator, o.pattern,
                plan.stream.seed, plan.stream.seed + o.batches - 1, r.device);
-    fmt::print("{}/: tau.exr, reference.exr, {} and {}\n\nNext: clratio combine --m {}/m*.exr --t {}/t{} --tau {}/tau.exr "
-               "--reference {}/reference.exr -o {}/out.exr\n",
-               o.folder, name_of_batch('m', 0, o.batches), name_of_batch('t', 0, o.batches), o.folder, o.folder,
-               o.batches == 1 ? ".exr" : "_*.exr", o.folder, o.folder, o.folder);
+    const char* const all = o.batches == 1 ? ".exr" : "_*.exr";
+    fmt::print(
+        "{0}/: tau.exr, reference.exr, {1} and {2}\n\nNext: clratio combine --m {0}/m{3} --t {0}/t{3} --tau {0}/tau.exr "
+        "--reference {0}/reference.exr -o {0}/out.exr\n",
+        o.folder, name_of_batch('m', 0, o.batches), name_of_batch('t', 0, o.batches), all);
 }
 
 int render(const Options& options) {
     const Plan plan = with_usage_errors([&] { return plan_of(options); });
     make_folder(options.folder);
+    require_no_other_batches(options);
     print_report(options, plan, render_all(options, plan));
     return ok;
 }
@@ -170,6 +193,7 @@ Writes into DIR
   tau.exr          the exact mean of t: what a perfect t.exr would be
   reference.exr    the exact mean of m: what you wish m.exr were
 m and t are one batch of weight --spp. With --batches B there are m_000.exr, t_000.exr, .. of seeds S, S + 1, ..
+A folder that holds batches of another render is refused.
 
 Estimators (where along a camera ray the fog is sampled)
   uni        evenly                          ds     by the fog on the ray, within the box (truncated)

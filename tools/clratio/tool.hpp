@@ -48,6 +48,7 @@ void add_study(CLI::App& app, Run& run);
 /// Keys in the order they were set, as a reader would want them.
 using Json = nlohmann::ordered_json;
 
-inline void print(const Json& object) { fmt::print("{}\n", object.dump(2)); }
+/// Bytes of a file's name that are no UTF-8 become U+FFFD.
+inline void print(const Json& object) { fmt::print("{}\n", object.dump(2, ' ', false, Json::error_handler_t::replace)); }
 
 }  // namespace tool
