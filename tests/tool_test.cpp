@@ -554,3 +554,36 @@ TEST(Tool, picture_draws_srgb_side_by_side) {
     EXPECT_NE(std::count(titled.begin(), titled.end(), 0), std::count(plain.begin(), plain.end(), 0));
     expect_refused({"picture", scratch / "a.exr", "-o", scratch / "p.png", "--titles", "a,b"}, 2, "2 titles for 1 images");
 }
+
+TEST(Tool, no_output_replaces_a_state) {
+    const Scratch scratch;
+    const std::string state = scratch / "s.exr", image = scratch / "o.exr";
+    answer(pairs("area", 1) + Words{"--tau", "1", "-o", image, "--state", state});
+    const std::string before = bytes_of(state);
+    expect_refused({"picture", image, "-o", state}, 2, "s.exr: holds a state");
+    const Said csv = clratio_tool(
+        {"errors", "--mu", ".5", "--tau", "1", "--sigma-m", ".5", "--sigma-t", ".35", "--count", "1e3", "--csv", state});
+    EXPECT_EQ(csv.code, 2) << csv.err;
+    EXPECT_EQ(bytes_of(state), before);
+    EXPECT_EQ(clratio_tool({"picture", image, "-o", scratch / "p.png"}).code, 0) << "planted fault: any file is a state";
+}
+
+TEST(Tool, numbers_are_read_strictly_and_names_need_not_be_text) {
+    const Words law{"law", "--mu", ".5", "--tau", "1", "--sigma-m", "1", "--sigma-t", ".35", "--x", "0"};
+    expect_refused(law + Words{"--n", "-1"}, 2, "--n: expected a whole number from 0 on, got -1");
+    expect_refused(law + Words{"--rho", ""}, 2, "--rho: expected a number");
+    expect_refused({"picture", "a.exr", "-o", "b.png", "--exposure", "nan"}, 2, "--exposure: expected a number");
+    const Scratch scratch;
+    const std::string odd = scratch / "o\xff.exr";
+    EXPECT_EQ(answer(pairs("area", 1) + Words{"--tau", "1", "-o", odd})["batches"], 1);
+    EXPECT_TRUE(std::filesystem::exists(odd));
+}
+
+TEST(Tool, render_refuses_a_folder_with_batches_of_another_render) {
+    const Scratch scratch;
+    const Words render{"render", "louvres", "--size", "8x6", "-o", scratch / "r"};
+    ASSERT_EQ(clratio_tool(render + Words{"--batches", "3"}).code, 0);
+    EXPECT_EQ(clratio_tool(render + Words{"--batches", "3", "--seed", "5"}).code, 0) << "its own files it replaces";
+    expect_refused(render + Words{"--batches", "2"}, 1, "_002.exr: is of another render");
+    expect_refused(render, 1, "is of another render");
+}
