@@ -21,8 +21,7 @@ bool wants_more(const CombineOutput& out) { return wants_interval(out) || out.bi
 
 bool regresses(Estimator e) { return device::clr_is_regression(static_cast<std::uint32_t>(e)); }
 
-/// The interval's quantile for a value of so many batches.
-/// `trials`: batches, or the groups of a jackknife.
+/// The interval's quantile for a value of so many trials: batches, or the groups of a jackknife.
 double quantile_for(const CombineOptions& options, std::uint64_t trials) {
     const std::uint64_t lost = regresses(options.estimator) && options.method == IntervalMethod::delta ? 2 : 1;
     return student_quantile(options.level, static_cast<double>(trials > lost ? trials - lost : 1));
@@ -156,7 +155,8 @@ std::string program_options(const Moments::State& s, const Reading& reading) {
 
 Event read_moments(const Moments& moments, Reading reading, std::span<const cl_event> waits) {
     auto& s = moments.state();
-    const bool counts_groups = reading.options.estimator == Estimator::jackknife;
+    const bool counts_groups =
+        reading.options.estimator == Estimator::jackknife && reading.options.method == IntervalMethod::delta;
     if (wants_interval(reading.out) && (counts_groups || s.options.nonfinite == NonFinite::skip))
         reading.quantiles = quantile_table(s.engine, s.batches(), reading.options);
     Launch launch(s.engine, "combine", "clr_combine_moments", program_options(s, reading), Lanes::wide);

@@ -31,7 +31,8 @@ std::string unwritable_pocl_cache() {
     fs::path there = folder;
     std::error_code error;
     while (there.has_relative_path() && !fs::exists(there, error)) there = there.parent_path();
-    return folder.empty() || access(there.c_str(), W_OK) == 0 ? "" : folder.string();
+    const bool writable = fs::is_directory(there, error) && access(there.c_str(), W_OK) == 0;
+    return folder.empty() || writable ? "" : folder.string();
 }
 
 DeviceError no_devices() {

@@ -243,7 +243,7 @@ cl_event draw(const MediumScene& scene, const Sampler& sampler, const Stream& st
         check_view(name, view, values);
         check_output(view, sizeof(float));
     }
-    check_overlap("m", m, "t", t);
+    check_apart("m", m, "t", t);
     return Launch(s.engine, "medium", "clr_medium_render", options_of(sampler, stream.generator))
         .view(m)
         .view(t)

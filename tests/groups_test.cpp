@@ -185,6 +185,19 @@ device::clr_question asks_crossfit() {
     return ask;
 }
 
+/// A value's groups, and the cross-fitted regression of them in double.
+struct Crossfit {
+    std::vector<TwinValue> groups;
+    double exact, bound;
+
+    Crossfit(const GroupedInput& in, std::size_t i, float tau) : groups(twins(in, i)) {
+        const auto want = reference(in, i);
+        exact = estimate(want, Estimator::crossfit_regression, static_cast<double>(tau));
+        bound = crossfit_bound(want, static_cast<double>(tau));
+    }
+    double off(float got) const { return std::fabs(static_cast<double>(got) - exact); }
+};
+
 /// Without asking the other groups where sums cancel.
 float trusting_crossfit(std::span<const TwinValue> groups, float tau) {
     using namespace device;
@@ -207,14 +220,11 @@ TEST(Groups, crossfit_holds_its_bound_where_one_batch_outweighs_all_others) {
         const GroupedInput in = with_fireflies(input_of(6, batches));
         int caught = 0;
         for (std::size_t i = 0; i < values; ++i) {
-            const auto want = reference(in, i);
-            const auto groups = twins(in, i);
-            const double exact = estimate(want, Estimator::crossfit_regression, static_cast<double>(tau));
-            const double bound = crossfit_bound(want, static_cast<double>(tau));
-            const auto got = read_twin(groups, tau, asks_crossfit());
-            EXPECT_NEAR(static_cast<double>(got.value), exact, bound) << batches << " batches, value " << i;
+            const Crossfit value(in, i, tau);
+            const auto got = read_twin(value.groups, tau, asks_crossfit());
+            EXPECT_LE(value.off(got.value), value.bound) << batches << " batches, value " << i;
             EXPECT_FALSE(got.flags & CLR_FLAG_FELL_BACK) << batches << " batches, value " << i;
-            caught += std::fabs(static_cast<double>(trusting_crossfit(groups, tau)) - exact) > bound;
+            caught += value.off(trusting_crossfit(value.groups, tau)) > value.bound;
         }
         EXPECT_GT(caught, static_cast<int>(values / 20)) << "planted fault: slopes in doubt are taken, " << batches;
     }
@@ -249,15 +259,12 @@ TEST(Groups, crossfit_holds_its_bound_where_t_hardly_varies) {
         const GroupedInput in = of_almost_constant_t(batches);
         int caught = 0;
         for (std::size_t i = 0; i < values; ++i) {
-            const auto want = reference(in, i);
-            const auto groups = twins(in, i);
-            const double exact = estimate(want, Estimator::crossfit_regression, static_cast<double>(tau));
-            const double bound = crossfit_bound(want, static_cast<double>(tau));
-            const auto off = [&](const std::vector<TwinValue>& read) {
-                return std::fabs(static_cast<double>(read_twin(read, tau, asks_crossfit()).value) - exact);
+            const Crossfit value(in, i, tau);
+            const auto off = [&](const std::vector<TwinValue>& groups) {
+                return value.off(read_twin(groups, tau, asks_crossfit()).value);
             };
-            EXPECT_LE(off(groups), bound) << batches << " batches, value " << i;
-            caught += off(without_lo_parts(groups)) > bound;
+            EXPECT_LE(off(value.groups), value.bound) << batches << " batches, value " << i;
+            caught += off(without_lo_parts(value.groups)) > value.bound;
         }
         EXPECT_GT(caught, 0) << "planted fault: hi parts alone, " << batches;
     }

@@ -513,6 +513,15 @@ TEST(Tool, without_a_platform_it_names_the_package_and_the_folder) {
     }
 }
 
+TEST(Tool, without_a_place_for_pocls_kernels_it_names_the_folder) {
+    expect_refused({"devices"}, 1, "cannot keep its kernels in /dev/null/pocl",
+                   {.environment = {{"POCL_CACHE_DIR", "/dev/null/pocl"}}});
+    const Scratch scratch;
+    const Said said = clratio_tool(
+        {"devices"}, {.environment = {{"OCL_ICD_VENDORS", "/nowhere"}, {"POCL_CACHE_DIR", scratch / "new/pocl"}}});
+    EXPECT_EQ(said.err.find("cannot keep"), std::string::npos) << "planted fault: any folder is to blame";
+}
+
 TEST(Tool, help_documents_the_exit_codes) {
     for (const Words& words : {Words{"--help"}, Words{"combine", "--help"}}) {
         const Said said = clratio_tool(words);

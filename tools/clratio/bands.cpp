@@ -92,6 +92,11 @@ clratio::Snapshot Bands::snapshot() const {
     return all;
 }
 
+std::uint64_t Bands::whole_weight() const {
+    const auto* fixed = states_.empty() ? nullptr : std::get_if<FixedMoments>(&states_.front());
+    return fixed ? fixed->weight() : 0;
+}
+
 std::uint64_t Bands::outside() const {
     std::uint64_t sum = 0;
     for (const State& state : states_)

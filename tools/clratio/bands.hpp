@@ -43,6 +43,8 @@ public:
     void add(std::span<const clratio::HostBatch> batches);
     /// Of what was added.
     ReadOut read_out(const clratio::Tau& tau, const Wanted& wanted) const;
+    /// Of all batches in sums of whole numbers; 0 in others, which have room for any.
+    std::uint64_t whole_weight() const;
     /// Finite values, of batches added since the sums were begun or taken up, that fixed point could not hold.
     std::uint64_t outside() const;
     /// What was added, as one state of the whole image.

@@ -149,7 +149,6 @@ void require_different(const Options& options) {
         const auto identity = identity_of(file);
         if (!written.insert(identity).second) throw UsageError(file + ": named for two outputs");
         if (read.contains(identity)) throw UsageError(file + ": an input, and an output");
-        if (file != options.state) require_no_state(file);
     }
 }
 
@@ -225,12 +224,11 @@ void require_fixed(const Options& options) {
     if (bits < sums.least_bits || bits > sums.most_bits)
         throw UsageError(fmt::format("--fixed and --range: expected {} to {} bits together, got {}", sums.least_bits,
                                      sums.most_bits, bits));
-    double sum = 0;
-    for (const double w : options.weight) {
+    for (const double w : options.weight)
         if (w != std::floor(w) || w < 1)
             throw UsageError(fmt::format("--weight: with --fixed whole numbers from 1 on, got {}", w));
-        sum += options.weight.size() == 1 ? w * static_cast<double>(options.m.size()) : w;
-    }
+    double sum = 0;
+    for (std::size_t k = 0; k < options.m.size(); ++k) sum += options.weight_of(options.first_batch + k);
     if (sum > static_cast<double>(sums.most_weight()))
         throw UsageError(fmt::format("--weight: the batches have {} samples, --fixed {} --range {} has room for {}; smaller "
                                      "ones have more",
@@ -426,7 +424,8 @@ void check(const Options& options) {
     require_state(options);
     require_watch(options);
     require_side_files(options);
-    for (const auto& file : outputs(options)) require_place_for(file);
+    for (const auto& file : outputs(options))
+        file == options.state ? require_place_for_state(file) : require_place_for(file);
 }
 
 void require_batches(const Options& options) {

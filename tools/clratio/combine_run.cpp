@@ -62,6 +62,16 @@ double root_mean_square(const std::vector<float>& errors) {
     return finite == 0 ? std::numeric_limits<double>::infinity() : std::sqrt(sum / static_cast<double>(finite));
 }
 
+/// The library refuses such a batch too, and those beside it, but knows neither its file nor the options.
+void require_room(const clratio::Image& m, double weight, double sum, const clratio::FixedOptions& fixed) {
+    if (sum <= static_cast<double>(fixed.most_weight())) return;
+    throw clratio::IoError(
+        m.path, m.layer,
+        fmt::format("its --weight {} brings the sum to {}, and sums of --fixed {} --range {} have room for "
+                    "{}; smaller ones have more",
+                    weight, sum, fixed.resolution, fixed.range, fixed.most_weight()));
+}
+
 /// How many intervals are of each kind, and in how many the reference lies.
 Intervals summary(const clratio::CombinedImage& out, const clratio::Image& reference) {
     Intervals sum;
@@ -101,7 +111,6 @@ CombineRun::CombineRun(const Options& options)
     if (const auto sums = keeper_.take_sums()) {
         sums_ = sums_of(*sums);
         bands_.emplace(engine_, *sums, keeper_.shape().channels.size());
-        weight_ = sums->groups.front().weight + sums->groups.front().weight_low;
     }
     report_.nonfinite = name_of(nonfinites, sums_.moments.nonfinite);
     if (bands_) fit_tau();
@@ -124,31 +133,20 @@ void CombineRun::fit(const Pair& pair) {
 
 void CombineRun::require_fit(const Pair& pair) {
     fit(pair);
-    if (sums_.moments.nonfinite == NonFinite::fail) {
-        require_finite(pair.m);
-        require_finite(pair.t);
-    }
-    if (sums_.fixed) require_room(pair);
-}
-
-// The library refuses such a batch too, but knows neither its file nor the options.
-void CombineRun::require_room(const Pair& pair) {
-    const double weight = options_.weight_of(pair.index), most = static_cast<double>(sums_.fixed->most_weight());
-    if (weight_ + weight > most)
-        throw clratio::IoError(
-            pair.m.path, pair.m.layer,
-            fmt::format("its --weight {} brings the sum to {}, and sums of --fixed {} --range {} have room "
-                        "for {}; smaller ones have more",
-                        weight, weight_ + weight, sums_.fixed->resolution, sums_.fixed->range, most));
-    weight_ += weight;
+    if (sums_.moments.nonfinite != NonFinite::fail) return;
+    require_finite(pair.m);
+    require_finite(pair.t);
 }
 
 CombineRun::Accepted CombineRun::accept(const std::vector<Pair>& pairs) {
     Accepted accepted;
+    double sum = bands_ ? static_cast<double>(bands_->whole_weight()) : 0;
     try {
         for (const Pair& pair : pairs) {
+            const double weight = options_.weight_of(pair.index);
             require_fit(pair);
-            accepted.batches.push_back({pair.m, pair.t, options_.weight_of(pair.index), pair.index});
+            if (sums_.fixed) require_room(pair.m, weight, sum += weight, *sums_.fixed);
+            accepted.batches.push_back({pair.m, pair.t, weight, pair.index});
         }
     } catch (...) {
         accepted.misfit = std::current_exception();

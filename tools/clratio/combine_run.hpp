@@ -52,7 +52,6 @@ private:
         std::exception_ptr misfit;
     };
     void require_fit(const Pair& pair);
-    void require_room(const Pair& pair);
     Accepted accept(const std::vector<Pair>& pairs);
     void write(ReadOut&& read_out);
 
@@ -66,7 +65,6 @@ private:
     Sums sums_;
     clratio::Image reference_;
     bool whole_ = true;  ///< all bands hold the same batches
-    double weight_ = 0;  ///< of the batches in sums of whole numbers
     double rms_error_ = 0;
 };
 

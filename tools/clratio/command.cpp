@@ -3,7 +3,7 @@
 #include <CLI/CLI.hpp>
 
 #include <charconv>
-#include <cmath>
+#include <limits>
 #include <optional>
 #include <type_traits>
 
@@ -44,7 +44,10 @@ Option& Option::one_of(std::vector<std::string> words) { return option_->check(C
 Option& Option::within(std::uint64_t least, std::uint64_t most) {
     return option_->check(number_between(least, most, fmt::format("a whole number from {} to {}", least, most))), *this;
 }
-Option& Option::positive() { return option_->check(number_between(1e-37, 1e37, "a number above 0")), *this; }
+Option& Option::positive() {
+    constexpr double least = std::numeric_limits<float>::denorm_min(), most = std::numeric_limits<float>::max();
+    return option_->check(number_between(least, most, "a number above 0 that a float holds")), *this;
+}
 Option& Option::seconds() { return option_->check(number_between(0.0, 1e9, "seconds, from 0 on")), *this; }
 Option& Option::between(double least, double most) {
     return option_->check(number_between(least, most, fmt::format("a number from {} to {}", least, most))), *this;

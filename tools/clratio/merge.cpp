@@ -25,7 +25,7 @@ void require_nothing_lost(const std::string& output, const clratio::BatchRanges&
 }
 
 int merge(const Options& options) {
-    require_place_for(options.output);
+    require_place_for_state(options.output);
     const FileLock lock(options.output);
     const clratio::Engine engine;
     const std::vector<std::filesystem::path> paths(options.states.begin(), options.states.end());

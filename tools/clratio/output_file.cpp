@@ -21,7 +21,6 @@ namespace fs = std::filesystem;
 
 std::string target_of(const std::string& file) {
     require_place_for(file);
-    require_no_state(file);
     return clratio::output_target(file).string();
 }
 
@@ -49,7 +48,7 @@ void OutputFile::commit() {
     file_.reset();
 }
 
-void require_place_for(const std::string& file) {
+void require_place_for_state(const std::string& file) {
     const auto folder = fs::path(file).parent_path();
     if (!folder.empty() && !fs::is_directory(folder)) cannot_write(file, "no folder " + folder.string());
     std::error_code failed;
@@ -58,7 +57,8 @@ void require_place_for(const std::string& file) {
     if (fs::exists(there) && !fs::is_regular_file(there)) cannot_write(file, "exists and is not a regular file");
 }
 
-void require_no_state(const std::string& file) {
+void require_place_for(const std::string& file) {
+    require_place_for_state(file);
     try {
         clratio::inspect_state(file);
     } catch (const clratio::Error&) {

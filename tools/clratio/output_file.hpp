@@ -31,12 +31,11 @@ private:
     std::unique_ptr<std::FILE, Close> file_;
 };
 
-/// Said before the work, not after it, as an IoError: that `file` has no folder, or that what stands there is no file. An
-/// empty name is none.
+/// Said before the work, not after it: an IoError that `file` has no folder, or that what stands there is no file; a
+/// UsageError that it holds a state, whose batches would be lost. An empty name is none.
 void require_place_for(const std::string& file);
-
-/// UsageError where `file` is a state: whatever replaces it loses batches.
-void require_no_state(const std::string& file);
+/// The same of a file that is to be a state itself.
+void require_place_for_state(const std::string& file);
 
 /// The same for all names that lead to one file, whether it exists or not.
 std::filesystem::path identity_of(const std::string& file);

@@ -54,7 +54,6 @@ int picture(const Options& options) {
     if (!options.titles.empty() && options.titles.size() != options.images.size())
         throw UsageError(fmt::format("--titles has {} titles for {} images", options.titles.size(), options.images.size()));
     require_place_for(options.output);
-    require_no_state(options.output);
     const auto output = identity_of(options.output);
     std::vector<clratio::Image> images;
     for (const auto& file : options.images) {
