@@ -1,18 +1,16 @@
 #define CL_USE_DEPRECATED_OPENCL_1_2_APIS  // clCreateCommandQueue: all that an OpenCL 1.2 device has
 #include "clratio/engine.hpp"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <cctype>
 #include <cstdlib>
 #include <cstring>
-#include <filesystem>
 
 #include "clratio/device/portable.h"
 #include "engine_state.hpp"
 #include "launch.hpp"
+#include "pocl.hpp"
 
 namespace clratio {
 namespace {
@@ -21,26 +19,10 @@ constexpr auto no_platform = "No OpenCL platform: install one for the CPU with '
                              "vendor's; drivers are looked for through the .icd files in /etc/OpenCL/vendors (or "
                              "$OCL_ICD_VENDORS)";
 
-/// PoCL offers no platform where it has no place for the kernels that it builds: that folder, or nothing.
-std::string unwritable_pocl_cache() {
-    namespace fs = std::filesystem;
-    fs::path folder;
-    for (const auto& [variable, below] :
-         {std::pair{"POCL_CACHE_DIR", ""}, {"XDG_CACHE_HOME", "pocl"}, {"HOME", ".cache/pocl"}})
-        if (const char* value = std::getenv(variable); folder.empty() && value && *value) folder = fs::path(value) / below;
-    fs::path there = folder;
-    std::error_code error;
-    while (there.has_relative_path() && !fs::exists(there, error)) there = there.parent_path();
-    const bool writable = fs::is_directory(there, error) && access(there.c_str(), W_OK) == 0;
-    return folder.empty() || writable ? "" : folder.string();
-}
-
 DeviceError no_devices() {
-    const std::string cache = unwritable_pocl_cache();
+    const std::string trouble = trouble_with_pocl_cache();
     std::string why = no_platform;
-    if (!cache.empty())
-        why += ". If it is PoCL and installed: it does not start, as it cannot keep its kernels in " + cache +
-               "; POCL_CACHE_DIR names another folder";
+    if (!trouble.empty()) why += ". If it is PoCL and installed: it does not start, as " + trouble;
     return {"clGetPlatformIDs", -1001, why};
 }
 

@@ -11,12 +11,14 @@
 #include <system_error>
 #include <utility>
 
+#include "output_target.hpp"
+
 namespace clratio {
 namespace {
 
 namespace fs = std::filesystem;
 
-std::string front(const fs::path& target) { return "." + target.filename().string() + "."; }
+std::string front(const fs::path& target) { return "." + short_name(target) + "."; }
 constexpr std::string_view back = ".tmp";
 
 fs::path beside(const fs::path& target) {

@@ -7,6 +7,7 @@
 #include "embedded.hpp"
 #include "engine_state.hpp"
 #include "launch.hpp"
+#include "pocl.hpp"
 
 namespace clratio {
 namespace {
@@ -81,13 +82,20 @@ std::string build_log(cl_program p, cl_device_id device) {
     return log;
 }
 
+std::string why_not_built(cl_program p, const Engine::State& s) {
+    const std::string log = build_log(p, s.device);
+    const bool pocl = s.info.platform == "Portable Computing Language";
+    const std::string trouble = pocl ? trouble_with_pocl_cache() : "";
+    return trouble.empty() ? log : log + "\nThis is PoCL, and " + trouble;
+}
+
 Program from_source(const Engine::State& s, const std::string& word, const std::string& source, const std::string& options) {
     const char* text = source.c_str();
     const std::size_t size = source.size();
     cl_int code = CL_SUCCESS;
     Program p(clCreateProgramWithSource(s.context.get(), 1, &text, &size, &code));
     check(code, "clCreateProgramWithSource");
-    if (!build(p.get(), s.device, options)) throw BuildError(word, build_log(p.get(), s.device));
+    if (!build(p.get(), s.device, options)) throw BuildError(word, why_not_built(p.get(), s));
     return p;
 }
 

@@ -120,6 +120,29 @@ std::string options_of_all_kernels() {
            std::to_string(getpid());
 }
 
+// A full disk, as far as a test may go: what PoCL found when it started is gone when it builds.
+TEST(Engine, a_build_without_a_place_for_pocls_kernels_names_the_folder) {
+    testing::GTEST_FLAG(death_test_style) = "threadsafe";
+    const char* given = std::getenv("CLRATIO_TEST_FOLDER");
+    std::optional<Scratch> scratch;
+    if (!given) scratch.emplace();
+    const std::string folder = given ? given : *scratch / ".";
+    const Environment shared("CLRATIO_TEST_FOLDER", folder), pocl("POCL_CACHE_DIR", folder + "/kernels");
+    const auto build = [&] {
+        const Engine engine({.disk_cache = false});
+        std::filesystem::remove_all(folder + "/kernels");
+        put_bytes(folder + "/kernels", "in its way");
+        try {
+            small_job(engine);
+        } catch (const BuildError& e) {
+            std::cerr << e.what();
+            std::exit(1);
+        }
+        std::exit(0);
+    };
+    EXPECT_EXIT(build(), testing::ExitedWithCode(1), "cannot keep its kernels in .*/kernels; POCL_CACHE_DIR names another");
+}
+
 // Drivers print warnings on the stderr of the program that builds, which is not theirs.
 TEST(Engine, builds_say_nothing) {
     for (const int width : {8, 16}) {

@@ -10,6 +10,7 @@
 #include <filesystem>
 
 #include "clratio/exception.hpp"
+#include "output_target.hpp"
 
 namespace tool {
 namespace {
@@ -22,9 +23,14 @@ bool still_there(int descriptor, const std::string& name) {
            opened.st_dev == named.st_dev;
 }
 
+std::string lock_of(const std::string& file) {
+    const auto target = std::filesystem::weakly_canonical(file);
+    return (target.parent_path() / (clratio::short_name(target) + ".lock")).string();
+}
+
 }  // namespace
 
-FileLock::FileLock(const std::string& file) : name_(std::filesystem::weakly_canonical(file).string() + ".lock") {
+FileLock::FileLock(const std::string& file) : name_(lock_of(file)) {
     for (;;) {
         descriptor_ = open(name_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
         if (descriptor_ < 0) throw clratio::IoError(file, "", "cannot be locked: " + std::string(std::strerror(errno)));

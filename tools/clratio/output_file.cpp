@@ -24,10 +24,14 @@ std::string target_of(const std::string& file) {
     return clratio::output_target(file).string();
 }
 
+std::string part_of(const fs::path& target) {
+    return (target.parent_path() / (clratio::short_name(target) + "." + std::to_string(getpid()) + ".part")).string();
+}
+
 }  // namespace
 
 OutputFile::OutputFile(std::string path)
-    : path_(std::move(path)), target_(target_of(path_)), part_(target_ + "." + std::to_string(getpid()) + ".part"),
+    : path_(std::move(path)), target_(target_of(path_)), part_(part_of(target_)),
       file_(std::fopen(part_.c_str(), "wb")) {
     if (!file_) fail();
 }
