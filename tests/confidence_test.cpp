@@ -151,6 +151,25 @@ TEST(Confidence, reliability_weights_have_no_unit) {
     EXPECT_TRUE(std::isinf(unit * (4 * unit * unit - unit * unit))) << "planted fault: third powers of weights";
 }
 
+// W - W2 / W of weights w, 1, 1 is 4 where w is large: of two floats of W, 48 bits, nothing is left of it above 2^46.
+TEST(Confidence, a_batch_that_outweighs_all_others_has_no_error_bar) {
+    const CombineOptions options{.standard_error = true};
+    for (const auto& [weight, known] : {std::pair{0x1p30, true}, {0x1p37, true}, {0x1p45, false}, {0x1p59, false}}) {
+        Moments s(Engine{}, 1, {.weights = Weights::reliability});
+        for (const float m : {1.0f, 2.0f, 4.0f}) {
+            const float t = 1;
+            s.add({&m, 1}, {&t, 1}, m == 1 ? weight : 1);
+        }
+        const Combined out = combine(s, 1.0f, options);
+        EXPECT_EQ(std::isfinite(out.standard_error[0]), known) << weight;
+        EXPECT_EQ(out.flags.no_error_bar, known ? 0u : 1u) << weight;
+        // M2 = 1 + 9, exact to w^-1; Var = M2 W2 / (W (W^2 - W2)), of which W - W2 / W = 4 has 2^-46 W of rounding.
+        if (known) {
+            EXPECT_NEAR(out.standard_error[0] / std::sqrt(10.0 / 4), 1, 0x1p-46 * weight + 0x1p-20);
+        }
+    }
+}
+
 // m and t in other units, likewise: m / t is 2^-80 of what it was, its square below every float.
 TEST(Confidence, intervals_hold_at_every_scale) {
     constexpr float small = 0x1p-40f, large = 0x1p40f;

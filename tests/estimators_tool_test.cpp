@@ -97,6 +97,18 @@ TEST(EstimatorsTool, SlowTails_of_model_c) {
     }
 }
 
+TEST(EstimatorsTool, models_are_separated_as_one_likes_and_short_tables_end) {
+    const auto one = simulate({"--models", "A,B", "--samples", "2048", "--most", "3"});
+    EXPECT_EQ(one, simulate({"--models", "A", "B", "--samples", "2048", "--most", "3"}));
+    EXPECT_EQ(one.at(1).at("model"), "B");
+    EXPECT_EQ(one.at(0).at("coverage"), json::array());
+    const auto text = [](const char* most) {
+        return clratio_tool({"estimators", "--models", "A", "--samples", "2048", "--most", most}).out;
+    };
+    EXPECT_EQ(text("3").find("Coverage"), std::string::npos) << "of no N";
+    EXPECT_NE(text("4").find("Coverage"), std::string::npos);
+}
+
 TEST(EstimatorsTool, misuse_is_refused) {
     const Said said = clratio_tool({"estimators", "--models", "Z"});
     EXPECT_EQ(said.code, 2);

@@ -58,11 +58,11 @@ FixedMoments grouped(const Engine& engine, const Input& in, std::size_t parts, S
         states[k < parts ? k : draw.bits() % parts].add(batches[k].m, batches[k].t, batches[k].weight);
     while (states.size() > 1) {
         std::swap(states[draw.bits() % states.size()], states.back());
-        const FixedMoments from = states.back();
+        const FixedMoments from = std::move(states.back());
         states.pop_back();
         states[draw.bits() % states.size()].merge(from);
     }
-    return states.front();
+    return std::move(states.front());
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <boost/multiprecision/cpp_bin_float.hpp>
 #include <cmath>
 #include <limits>
+#include <type_traits>
 
 #include "launch.hpp"
 #include "support/refused.hpp"
@@ -423,4 +424,14 @@ TEST(Moments, an_empty_state_is_zero_whatever_its_planes_hold) {
     EXPECT_EQ(all_sums(dirty), before);
     clean.merge(filled);
     EXPECT_EQ(all_sums(clean), before);
+}
+
+TEST(Moments, a_state_has_one_owner) {
+    static_assert(!std::is_copy_constructible_v<Moments> && !std::is_copy_assignable_v<Moments>);
+    const Engine engine;
+    Moments from(engine, values), twin(engine, values);
+    from.add(batches_of(make_input(1, 3)));
+    twin.merge(from);
+    const Moments to = std::move(from);
+    EXPECT_EQ(all_sums(to), all_sums(twin));
 }

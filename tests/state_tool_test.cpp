@@ -63,6 +63,18 @@ TEST(StateTool, the_verdict_sees_a_batch_counted_twice) {
     EXPECT_EQ(verdict(state, batches, 5), "it has lost batches");
 }
 
+TEST(StateTool, a_batch_that_is_refused_tells_what_is_held) {
+    const Scratch scratch;
+    const Batches batches(2);  // number 1 has a NaN
+    const std::string state = scratch / "s.exr",
+                      held = state + " holds batches [0,1); the same command with --resume goes on";
+    const Words strict{"--state", state, "--nonfinite", "fail"};
+    expect_refused(batches.combine(1, 2) + strict, 1, "refused by --nonfinite fail\n");
+    EXPECT_FALSE(std::filesystem::exists(state)) << "nothing is held";
+    expect_refused(batches.combine(0, 2) + strict, 1, "refused by --nonfinite fail; " + held);
+    EXPECT_EQ(read_state(state).ranges.text(), "[0,1)");
+}
+
 TEST(StateTool, what_does_not_fit_the_state_is_refused) {
     const Scratch scratch;
     const Batches batches(4);

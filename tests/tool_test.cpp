@@ -588,6 +588,23 @@ TEST(Tool, numbers_are_read_strictly_and_names_need_not_be_text) {
     EXPECT_TRUE(std::filesystem::exists(odd));
 }
 
+TEST(Tool, an_empty_name_is_refused) {
+    expect_refused(pairs("area", 1) + Words{"--tau", "", "-o", "never.exr"}, 2, "--tau: expected a text, got nothing");
+    expect_refused({"compare", "", "ref.exr"}, 2, "expected a text, got nothing");
+}
+
+TEST(Tool, a_name_may_be_as_long_as_the_system_lets_it) {
+    const Scratch scratch;
+    const std::string longest = std::string(251, 'x');
+    const std::string image = scratch / longest + ".exr", png = scratch / longest + ".png";
+    const Words job =
+        pairs("area", 1) + Words{"--tau", "1", "-o", image, "--state", scratch / ("s" + image.substr(image.size() - 254))};
+    EXPECT_EQ(clratio_tool(job).code, 0);
+    EXPECT_EQ(clratio_tool({"picture", image, "-o", png}).code, 0);
+    EXPECT_EQ(scratch.files(), 3u) << "nothing else is left";
+    expect_refused({"picture", image, "-o", scratch / longest + "x.png"}, 1, "too long");
+}
+
 TEST(Tool, render_refuses_a_folder_with_batches_of_another_render) {
     const Scratch scratch;
     const Words render{"render", "louvres", "--size", "8x6", "-o", scratch / "r"};

@@ -59,6 +59,11 @@ public:
     /// The state that the snapshot was taken of, bit for bit. Errors: InvalidArgument where it does not fit together.
     FixedMoments(const Engine& engine, const Snapshot& snapshot);
 
+    /// Moves only, as a copy would be a second state or a second name of one: merge() into a new state, or a Snapshot,
+    /// copies.
+    FixedMoments(FixedMoments&&) noexcept = default;
+    FixedMoments& operator=(FixedMoments&&) noexcept = default;
+
     static std::uint64_t state_bytes(std::uint64_t values, FixedOptions options = {});
 
     /// Blocking. Spans of size() floats on the host.

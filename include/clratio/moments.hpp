@@ -86,6 +86,11 @@ public:
     /// The state that the snapshot was taken of, bit for bit. Errors: InvalidArgument where it does not fit together.
     Moments(const Engine& engine, const Snapshot& snapshot);
 
+    /// Moves only, as a copy would be a second state or a second name of one: merge() into a new state, or a Snapshot,
+    /// copies.
+    Moments(Moments&&) noexcept = default;
+    Moments& operator=(Moments&&) noexcept = default;
+
     static std::uint64_t plane_stride(std::uint64_t values);  ///< values rounded up to whole tiles
     static std::uint64_t plane_bytes(std::uint64_t values);
     static std::uint64_t state_bytes(std::uint64_t values, MomentsOptions options = {});  ///< of all planes

@@ -49,8 +49,11 @@ CombineOptions plain_mean(const CombineOptions& options) {
     return {.estimator = clratio::Estimator::mean, .zero = options.zero, .flag_image = false};
 }
 
-Moments moments_of(const Moments& state) { return state; }
-Moments moments_of(const FixedMoments& state) { return state.moments(); }
+/// The state itself, or what is made of it.
+const Moments& moments_of(const Bands::State& state, std::optional<Moments>& made) {
+    const auto* moments = std::get_if<Moments>(&state);
+    return moments ? *moments : made.emplace(std::get<FixedMoments>(state).moments());
+}
 
 }  // namespace
 
@@ -123,7 +126,8 @@ ReadOut Bands::read_out(const Tau& tau, const Wanted& wanted) const {
     Combined chosen, mean;
     for (std::uint64_t band = 0; band < bands(); ++band) {
         const Tau part = slice(tau, begin(band), size(band));
-        const Moments state = std::visit([](const auto& s) { return moments_of(s); }, states_[band]);
+        std::optional<Moments> made;
+        const Moments& state = moments_of(states_[band], made);
         chosen = clratio::combine(state, part, wanted.options, std::move(chosen));
         reserve(out.chosen, chosen, values_);
         append(out.chosen, chosen);

@@ -35,6 +35,8 @@ ReadOut read_at_once(const clratio::Engine& engine, std::span<const clratio::Hos
 
 class Bands {
 public:
+    using State = std::variant<clratio::Moments, clratio::FixedMoments>;
+
     Bands(const clratio::Engine& engine, std::uint64_t values, std::uint64_t channels, const Sums& sums);
 
     /// Goes on with the sums of a whole image.
@@ -54,7 +56,6 @@ private:
     std::uint64_t bands() const { return (values_ + band_ - 1) / band_; }
     std::uint64_t begin(std::uint64_t band) const { return band * band_; }
     std::uint64_t size(std::uint64_t band) const { return std::min(band_, values_ - begin(band)); }
-    using State = std::variant<clratio::Moments, clratio::FixedMoments>;
     State make(std::uint64_t band) const;
     std::vector<clratio::HostBatch> slices(std::uint64_t band, std::span<const clratio::HostBatch> batches) const;
 

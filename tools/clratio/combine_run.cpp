@@ -181,11 +181,15 @@ void CombineRun::save() {
     if (bands_ && whole_) timed(report_.seconds.encode, [&] { keeper_.save(*bands_); });
 }
 
+std::string CombineRun::what_is_held() const {
+    return fmt::format("{} holds batches {}; the same command with --resume goes on", options_.state,
+                       keeper_.ranges().text());
+}
+
 std::string CombineRun::how_to_go_on() const {
     if (options_.state.empty()) return fmt::format("stopped after {} batch{}", batches(), batches() == 1 ? "" : "es");
     if (batches() == 0) return "stopped before the first batch; there is no state to go on with";
-    return fmt::format("stopped: {} holds batches {}; the same command with --resume goes on", options_.state,
-                       keeper_.ranges().text());
+    return "stopped: " + what_is_held();
 }
 
 void CombineRun::read_out() {

@@ -28,6 +28,10 @@ public:
     template <class Work> void saved_at_the_end(Work work) {
         try {
             work();
+        } catch (const clratio::IoError& e) {
+            save();
+            if (batches() == 0) throw;
+            throw clratio::IoError(e.path, e.layer, e.reason + "; " + what_is_held());
         } catch (...) {
             save();
             throw;
@@ -45,6 +49,7 @@ public:
     int report(double decode);
 
 private:
+    std::string what_is_held() const;
     void fit_tau();
     /// Those before the first that does not fit, and why it does not.
     struct Accepted {

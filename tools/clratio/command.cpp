@@ -29,6 +29,8 @@ template <class T> std::string refuse_misread(const std::string& text) {
     return std::is_unsigned_v<T> && text.front() == '-' ? "expected a whole number from 0 on, got " + text : "";
 }
 
+std::string refuse_empty(const std::string& text) { return text.empty() ? "expected a text, got nothing" : ""; }
+
 template <class T> struct Number { using type = T; };
 template <class T> struct Number<std::optional<T>> { using type = T; };
 template <class T> struct Number<std::vector<T>> { using type = T; };
@@ -65,7 +67,10 @@ Command::Command(CLI::App& app, const std::string& name, const std::string& purp
 template <class T> Option Command::option(const std::string& names, T& value, const std::string& help) {
     CLI::Option* option = app_->add_option(names, value, help);
     using Single = typename Number<T>::type;
-    if constexpr (std::is_arithmetic_v<Single>) option->check(refuse_misread<Single>);
+    if constexpr (std::is_arithmetic_v<Single>)
+        option->check(refuse_misread<Single>);
+    else
+        option->check(refuse_empty);
     return Option(option);
 }
 

@@ -259,6 +259,7 @@ void print_markdown(const Result& result, const Options& options) {
     print_rows(result, at, [](const Cell& c) { return fmt::format("{:.3f} ± {:.3f}", c.rmse.mean, c.rmse.error); });
     fmt::print("\nShare of estimates outside [0, tau]\n\n");
     print_rows(result, at, [](const Cell& c) { return fmt::format("{:.4f}", c.outside); });
+    if (result.coverage.empty()) return;
     fmt::print("\nCoverage of intervals of level .95\n\n| N | mean, delta | ratio, delta | ratio, Fieller | not bounded |\n"
                "|---|---|---|---|---|\n");
     const auto share = [](const Measured& m) { return fmt::format("{:.4f} ± {:.4f}", m.mean, m.error); };
@@ -280,6 +281,7 @@ Json json_of(const Result& result) {
                              {"outside", c.outside}});
         out["estimators"][row.name] = cells;
     }
+    out["coverage"] = Json::array();
     for (const Coverage& c : result.coverage)
         out["coverage"].push_back({{"n", c.batches},
                                    {"mean", json_of(c.mean)},
@@ -360,7 +362,7 @@ void add_estimators(CLI::App& app, Run& run) {
     Command command(app, "estimators", "Simulate every estimator: bias, error and coverage on models of known mean");
     std::vector<std::string> names;
     for (const auto& m : pair_models()) names.push_back(m.name);
-    command.option("--models", o->models, "Which models").type("NAME").one_of(names);
+    command.option("--models", o->models, "Which models, with commas or blanks between").commas().type("NAME").one_of(names);
     command.option("--samples", o->samples, "Samples for each column of a table")
         .type("WHOLE")
         .within(1024, std::uint64_t{1} << 40)

@@ -31,8 +31,7 @@ std::string part_of(const fs::path& target) {
 }  // namespace
 
 OutputFile::OutputFile(std::string path)
-    : path_(std::move(path)), target_(target_of(path_)), part_(part_of(target_)),
-      file_(std::fopen(part_.c_str(), "wb")) {
+    : path_(std::move(path)), target_(target_of(path_)), part_(part_of(target_)), file_(std::fopen(part_.c_str(), "wb")) {
     if (!file_) fail();
 }
 

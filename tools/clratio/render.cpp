@@ -165,9 +165,10 @@ void print_report(const Options& o, const Plan& plan, const Report& r) {
                {"samples_per_second", samples / r.seconds}});
         return;
     }
-    fmt::print("{}\n{} x {} pixels, {} rays hit the medium; {} batches of {} samples, {} {}, seeds {} to {}, on {}\n",
-               plan.scene.title, plan.frame.width, plan.frame.height, r.hits, o.batches, o.samples, o.estimator, o.pattern,
-               plan.stream.seed, plan.stream.seed + o.batches - 1, r.device);
+    fmt::print("{}\n{} x {} pixels, {} rays hit the medium; {} batch{} of {} sample{}, {} {}, seeds {} to {}, on {}\n",
+               plan.scene.title, plan.frame.width, plan.frame.height, r.hits, o.batches, o.batches == 1 ? "" : "es",
+               o.samples, o.samples == 1 ? "" : "s", o.estimator, o.pattern, plan.stream.seed,
+               plan.stream.seed + o.batches - 1, r.device);
     const char* const all = o.batches == 1 ? ".exr" : "_*.exr";
     fmt::print(
         "{0}/: tau.exr, reference.exr, {1} and {2}\n\nNext: clratio combine --m {0}/m{3} --t {0}/t{3} --tau {0}/tau.exr "

@@ -76,6 +76,8 @@ typedef struct {
     clr_mask few;
 } clr_evidence;
 
+#define CLR_OUTWEIGHED 0x1p-40f
+
 CLR_FN clr_evidence clr_evidence_of(clr_uint batches, clr_two weight, clr_two weight2, clr_u32 reliability) {
     const clr_real zero = (clr_real)(0.0f), one = (clr_real)(1.0f);
     clr_evidence n;
@@ -87,8 +89,11 @@ CLR_FN clr_evidence clr_evidence_of(clr_uint batches, clr_two weight, clr_two we
         // W2 / (W (W^2 - W2)) without third powers, which would leave the range of float long before the weights do.
         const clr_mask none = !(weight.hi > zero);
         const clr_two mean = clr_two_divide(weight2, clr_two_make(none ? one : weight.hi, none ? zero : weight.lo));
-        divisor = weight.hi * clr_two_subtract(weight, mean).hi;
+        const clr_real others = clr_two_subtract(weight, mean).hi;
+        divisor = weight.hi * others;
         numerator = mean.hi;
+        // One batch outweighs the others so far that of their weight nothing but rounding is left.
+        n.few = n.few || !(others > weight.hi * (clr_real)(CLR_OUTWEIGHED));
     }
     n.few = n.few || !(divisor > zero);
     n.scale = n.few ? zero : numerator / (n.few ? one : divisor);
