@@ -249,6 +249,12 @@ CLR_FN void clr_read_record(clr_record r, clr_evidence n, clr_reader* reader, ul
     clr_write_reading(e, *reader->reading, ask.outputs, reader->to, &reader->tally, first, count);
 }
 
+// While a block is read out nothing else reads memory: what the next one needs besides m and t is fetched then.
+CLR_FN void clr_prefetch_next(const bool keeps, const clr_adder* a, const clr_reader* reader, ulong at) {
+    if (keeps) clr_prefetch_moments(a->planes, clr_state_of(a), at);
+    clr_prefetch(reader->tau + reader->reading->tau.offset + at);
+}
+
 // What a work-item adds and reads out.
 CLR_WORK_FN void clr_add_and_read(const bool keeps, clr_adder* a, clr_reader* reader, clr_span span) {
     const clr_state grown = clr_grown(a);
@@ -264,6 +270,7 @@ CLR_WORK_FN void clr_add_and_read(const bool keeps, clr_adder* a, clr_reader* re
         const uint alone = in_block ? clr_fill_block(keeps, &block, a, v * CLR_WIDTH) : 1u;
         for (uint k = 0; k < done; ++k) {
             const ulong at = (v + k) * CLR_WIDTH;
+            if (in_block) clr_prefetch_next(keeps, a, reader, at + CLR_BLOCK * CLR_WIDTH);
             clr_record r = whole;
             clr_evidence n = reader->whole;
             if (alone >> k & 1u) {

@@ -132,6 +132,14 @@ CLR_FN void clr_prefetch_two(global const float* p, clr_state s, ulong i) {
     clr_prefetch_vector(p + (i / CLR_TILE * s.groups + s.place) * (2 * CLR_TILE) + i % CLR_TILE * 2);
 }
 
+CLR_FN void clr_prefetch_moments(clr_planes p, clr_state s, ulong i) {
+    clr_prefetch_two(p.m, s, i);
+    clr_prefetch_two(p.t, s, i);
+    clr_prefetch_two(p.mm, s, i);
+    clr_prefetch_two(p.tt, s, i);
+    clr_prefetch_two(p.mt, s, i);
+}
+
 // A group's turn in a vector's share of what all groups have in a tile. If every group takes its turn, lines are asked for
 // in the order of their addresses, and a processor sees one run.
 CLR_FN void clr_prefetch_turn(global const float* p, clr_state s, ulong i) {
