@@ -163,6 +163,11 @@ CLR_FN uint clr_add_block(clr_adder* a, ulong first) {
     return doubtful;
 }
 
+CLR_FN bool clr_is_doubtful(const bool keeps, const clr_adder* a, clr_moments moments, ulong first) {
+    if (!clr_skips(a)) return false;
+    return clr_in_doubt(moments, keeps ? clr_lost_before(a->planes, clr_state_of(a), first) : (clr_real)(0.0f));
+}
+
 // The same for a block that stays. Of no state it is one pass over and over: a small program is loaded sooner.
 CLR_FN uint clr_fill_block(const bool keeps, clr_block* block, clr_adder* a, ulong first) {
     clr_uint signs = (clr_uint)(0u);
@@ -173,10 +178,8 @@ CLR_FN uint clr_fill_block(const bool keeps, clr_block* block, clr_adder* a, ulo
     for (uint k = keeps ? 1 : 0; k < a->batches->count; ++k) clr_pass(false, false, k, block, a, first, &signs);
     if (clr_any(signs >= (clr_uint)(0x80000000u))) clr_count_negative(a, first);
     uint doubtful = 0;
-    for (uint v = 0; clr_skips(a) && v < CLR_BLOCK; ++v) {
-        const clr_real lost = keeps ? clr_lost_before(a->planes, clr_state_of(a), first + v * CLR_WIDTH) : (clr_real)(0.0f);
-        doubtful |= clr_in_doubt(block->moments[v], lost) ? 1u << v : 0u;
-    }
+    for (uint v = 0; clr_skips(a) && v < CLR_BLOCK; ++v)
+        doubtful |= clr_is_doubtful(keeps, a, block->moments[v], first + v * CLR_WIDTH) ? 1u << v : 0u;
     return doubtful;
 }
 
@@ -249,40 +252,67 @@ CLR_FN void clr_read_record(clr_record r, clr_evidence n, clr_reader* reader, ul
     clr_write_reading(e, *reader->reading, ask.outputs, reader->to, &reader->tally, first, count);
 }
 
-// While a block is read out nothing else reads memory: what the next one needs besides m and t is fetched then.
-CLR_FN void clr_prefetch_next(const bool keeps, const clr_adder* a, const clr_reader* reader, ulong at) {
-    if (keeps) clr_prefetch_moments(a->planes, clr_state_of(a), at);
-    clr_prefetch(reader->tau + reader->reading->tau.offset + at);
+// The only batch of a launch over a vector of a block.
+CLR_FN clr_moments clr_add_one(const bool keeps, const clr_adder* a, ulong first, clr_uint* signs) {
+    const clr_batch batch = a->batches->of[0];
+    global const float* m_from = a->m[0] + batch.m.offset + first;
+    global const float* t_from = a->t[0] + batch.t.offset + first;
+    clr_prefetch(m_from + CLR_BLOCK * CLR_WIDTH);
+    clr_prefetch(t_from + CLR_BLOCK * CLR_WIDTH);
+    const clr_real m = clr_load(m_from), t = clr_load(t_from);
+    *signs |= clr_bits(m) | clr_bits(t);
+    const clr_moments before = keeps ? clr_load_moments(a->planes, clr_state_of(a), first) : clr_moments_none();
+    return clr_moments_add(before, m, t, clr_entry_of(&batch), a->state.group.batches);
 }
 
-// What a work-item adds and reads out.
+// What the same vector of the next block needs besides m and t: while a block is read out nothing else reads memory.
+CLR_FN void clr_prefetch_next(const bool keeps, const clr_adder* a, const clr_reader* reader, ulong first) {
+    const ulong next = first + CLR_BLOCK * CLR_WIDTH;
+    if (keeps) clr_prefetch_moments(a->planes, clr_state_of(a), next);
+    clr_prefetch(reader->tau + reader->reading->tau.offset + next);
+}
+
+// All but the moments of values that have lost no batch.
+CLR_FN clr_record clr_record_of_all(clr_group g) {
+    clr_record r;
+    r.weight = clr_both(g.weight_hi, g.weight_lo);
+    r.weight2 = clr_both(g.weight2_hi, g.weight2_lo);
+    r.batches = (clr_uint)(g.batches);
+    r.ratios.quotient = r.ratios.zero_m = r.ratios.zero_share = clr_both(0.0f, 0.0f);
+    return r;
+}
+
+// What a work-item adds and reads out. A block stays in the cache while several batches go over it, and is read out then.
+// One batch is added and read out vector by vector, in three quarters of the time: neither memory nor arithmetic waits.
 CLR_WORK_FN void clr_add_and_read(const bool keeps, clr_adder* a, clr_reader* reader, clr_span span) {
-    const clr_state grown = clr_grown(a);
-    clr_record whole;
-    whole.weight = clr_both(grown.group.weight_hi, grown.group.weight_lo);
-    whole.weight2 = clr_both(grown.group.weight2_hi, grown.group.weight2_lo);
-    whole.batches = (clr_uint)(grown.group.batches);
-    whole.ratios.quotient = whole.ratios.zero_m = whole.ratios.zero_share = clr_both(0.0f, 0.0f);
+    const clr_record whole = clr_record_of_all(clr_grown(a).group);
+    const bool one = a->batches->count == 1;
     for (ulong v = span.begin; v < span.end;) {
         const bool in_block = clr_is_block(a, v, span);
-        const ulong done = in_block ? CLR_BLOCK : 1;
+        const ulong done = in_block ? CLR_BLOCK : 1, first = v * CLR_WIDTH;
+        clr_uint signs = (clr_uint)(0u);
         clr_block block;
-        const uint alone = in_block ? clr_fill_block(keeps, &block, a, v * CLR_WIDTH) : 1u;
+        const uint doubtful = !in_block ? 1u : one ? 0u : clr_fill_block(keeps, &block, a, first);
         for (uint k = 0; k < done; ++k) {
-            const ulong at = (v + k) * CLR_WIDTH;
-            if (in_block) clr_prefetch_next(keeps, a, reader, at + CLR_BLOCK * CLR_WIDTH);
+            const ulong at = first + k * CLR_WIDTH;
             clr_record r = whole;
             clr_evidence n = reader->whole;
-            if (alone >> k & 1u) {
+            bool alone = doubtful >> k & 1u;
+            if (in_block) {
+                clr_prefetch_next(keeps, a, reader, at);
+                r.moments = one ? clr_add_one(keeps, a, at, &signs) : block.moments[k];
+                alone = alone || (one && clr_is_doubtful(keeps, a, r.moments, at));
+            }
+            if (alone) {
                 r = clr_add_vector(a, at, !in_block);
                 if (keeps) clr_store_record(r, a->planes, clr_state_of(a), at);
                 if (clr_skips(a)) n = clr_evidence_of(r.batches, r.weight, r.weight2, reader->reading->ask.reliability);
-            } else {
-                r.moments = block.moments[k];
-                if (keeps) clr_put_back(r.moments, a, at);
+            } else if (keeps) {
+                clr_put_back(r.moments, a, at);
             }
             clr_read_record(r, n, reader, at, a->count);
         }
+        if (clr_any(signs >= (clr_uint)(0x80000000u))) clr_count_negative(a, first);
         v += done * span.step;
     }
 }
