@@ -184,6 +184,26 @@ TEST(Batches, misuse_is_refused_by_name) {
             "NonFinite::fail");
 }
 
+// A launch of one batch goes vector by vector, also where some values have lost it.
+TEST(Batches, one_at_a_time_into_a_state_equals_the_two_calls) {
+    const Input in(3);
+    for (const auto& shape : all_shapes())
+        for (const NonFinite nonfinite : {NonFinite::skip, NonFinite::propagate}) {
+            const Engine engine(shape.options);
+            Moments fused(engine, values, {.nonfinite = nonfinite}), apart(engine, values, {.nonfinite = nonfinite});
+            const CombineOptions options{.standard_error = true};
+            for (const HostBatch& batch : in.batches()) {
+                const Combined now = add_and_combine(fused, std::span(&batch, 1), in.control(), options);
+                apart.add(std::span(&batch, 1));
+                EXPECT_EQ(bits(now), bits(combine(apart, in.control(), options))) << shape.name;
+            }
+            EXPECT_EQ(fused.bits(&StatePlanes::mt), apart.bits(&StatePlanes::mt)) << shape.name;
+            EXPECT_EQ(fused.bits(&StatePlanes::batches), apart.bits(&StatePlanes::batches)) << shape.name;
+            EXPECT_EQ(fused.skipped(), nonfinite == NonFinite::skip ? 2u : 0u) << shape.name;
+            EXPECT_EQ(fused.negatives(), 2u) << shape.name;
+        }
+}
+
 TEST(BatchesSmall, every_path) {
     const Engine engine({.width = 4, .path = EngineOptions::Path::ranges, .work_items = 2, .disk_cache = false});
     const Input in(2, 150);  // one block of 128 and the rest
@@ -191,6 +211,9 @@ TEST(BatchesSmall, every_path) {
     const auto options = CombineOptions{.standard_error = true};
     const Combined kept = add_and_combine(sum, in.batches(), in.control(), options);
     EXPECT_EQ(bits(combine_batches(engine, in.batches(), in.control(), options)), bits(kept));
+    const HostBatch one = in.batches().front();
+    add_and_combine(sum, std::span(&one, 1), in.control(), options);
+    EXPECT_EQ(sum.batches(), 3u);
 }
 
 TEST(Batches, kernels_are_clean_under_oclgrind) {
