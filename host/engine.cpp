@@ -135,8 +135,7 @@ void choose_shape(Engine::State& s) {
         throw InvalidArgument("width", "1, 2, 4, 8 or 16 lanes", std::to_string(o.width));
     s.grouped = o.path == EngineOptions::Path::groups || (o.path == EngineOptions::Path::automatic && !cpu);
     s.width = o.width ? o.width : s.grouped ? 1 : s.info.preferred_width;
-    const bool clang = s.info.platform == "Portable Computing Language";
-    s.wide = o.width == 0 && !s.grouped && s.width >= 8 && clang ? 2 * s.width : s.width;
+    s.wide = o.width == 0 && !s.grouped && s.width >= 8 && is_pocl(s.info) ? 2 * s.width : s.width;
     s.work_items = o.work_items ? o.work_items : s.grouped ? 64 : 8 * std::max(1u, s.info.compute_units);
 }
 

@@ -22,6 +22,8 @@ fs::path cache_folder() {
 
 }  // namespace
 
+bool is_pocl(const DeviceInfo& device) { return device.platform == "Portable Computing Language"; }
+
 std::string trouble_with_pocl_cache() {
     const fs::path folder = cache_folder();
     if (folder.empty()) return "";

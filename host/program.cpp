@@ -84,8 +84,7 @@ std::string build_log(cl_program p, cl_device_id device) {
 
 std::string why_not_built(cl_program p, const Engine::State& s) {
     const std::string log = build_log(p, s.device);
-    const bool pocl = s.info.platform == "Portable Computing Language";
-    const std::string trouble = pocl ? trouble_with_pocl_cache() : "";
+    const std::string trouble = is_pocl(s.info) ? trouble_with_pocl_cache() : "";
     return trouble.empty() ? log : log + "\nThis is PoCL, and " + trouble;
 }
 

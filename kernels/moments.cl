@@ -62,6 +62,12 @@ CLR_FN bool clr_in_doubt(clr_moments s, clr_real lost) {
     return clr_any(clr_fma(s.m.hi, zero, clr_fma(s.t.hi, zero, lost)) != zero);
 }
 
+// Left to clr_add_vector.
+CLR_FN bool clr_is_doubtful(const bool keeps, const clr_adder* a, clr_moments moments, ulong first) {
+    if (!clr_skips(a)) return false;
+    return clr_in_doubt(moments, keeps ? clr_lost_before(a->planes, clr_state_of(a), first) : (clr_real)(0.0f));
+}
+
 CLR_FN clr_state clr_grown(const clr_adder* a) {
     const clr_batch last = a->batches->of[a->batches->count - 1];
     const clr_group group = {a->state.group.batches + a->batches->count, last.sum_hi, last.sum_lo, last.sum2_hi,
@@ -125,7 +131,7 @@ CLR_FN uint clr_pass(const bool is_first, const bool is_last, uint k, clr_block*
             const clr_moments moments = clr_moments_add(before, m, t, e, index);
             if (!is_last)
                 block->moments[v] = moments;
-            else if (clr_skips(a) && clr_in_doubt(moments, clr_lost_before(a->planes, clr_state_of(a), first + c)))
+            else if (clr_is_doubtful(true, a, moments, first + c))
                 doubtful |= 1u << v;
             else
                 clr_put_back(moments, a, first + c);
@@ -161,11 +167,6 @@ CLR_FN uint clr_add_block(clr_adder* a, ulong first) {
     }
     if (clr_any(signs >= (clr_uint)(0x80000000u))) clr_count_negative(a, first);
     return doubtful;
-}
-
-CLR_FN bool clr_is_doubtful(const bool keeps, const clr_adder* a, clr_moments moments, ulong first) {
-    if (!clr_skips(a)) return false;
-    return clr_in_doubt(moments, keeps ? clr_lost_before(a->planes, clr_state_of(a), first) : (clr_real)(0.0f));
 }
 
 // The same for a block that stays. Of no state it is one pass over and over: a small program is loaded sooner.

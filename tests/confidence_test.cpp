@@ -154,19 +154,25 @@ TEST(Confidence, reliability_weights_have_no_unit) {
 // W - W2 / W of weights w, 1, 1 is 4 where w is large: of two floats of W, 48 bits, nothing is left of it above 2^46.
 TEST(Confidence, a_batch_that_outweighs_all_others_has_no_error_bar) {
     const CombineOptions options{.standard_error = true};
-    for (const auto& [weight, known] : {std::pair{0x1p30, true}, {0x1p37, true}, {0x1p45, false}, {0x1p59, false}}) {
-        Moments s(Engine{}, 1, {.weights = Weights::reliability});
+    const auto outweighed = [&](double weight, Weights weights) {
+        Moments s(Engine{}, 1, {.weights = weights});
         for (const float m : {1.0f, 2.0f, 4.0f}) {
             const float t = 1;
             s.add({&m, 1}, {&t, 1}, m == 1 ? weight : 1);
         }
-        const Combined out = combine(s, 1.0f, options);
+        return combine(s, 1.0f, options);
+    };
+    for (const auto& [weight, known] : {std::pair{0x1p30, true}, {0x1p37, true}, {0x1p45, false}, {0x1p59, false}}) {
+        const Combined out = outweighed(weight, Weights::reliability);
         EXPECT_EQ(std::isfinite(out.standard_error[0]), known) << weight;
         EXPECT_EQ(out.flags.no_error_bar, known ? 0u : 1u) << weight;
-        // M2 = 1 + 9, exact to w^-1; Var = M2 W2 / (W (W^2 - W2)), of which W - W2 / W = 4 has 2^-46 W of rounding.
+        // M2 = 1 + 9, to w^-1; Var = M2 W2 / (W (W^2 - W2)). Both sums are exact here, W2 / W is good to 2^-43 of W, so that
+        // W - W2 / W = 4 is to 2^-45 W of itself, and its root to half of that. 2^-20: four roundings of floats.
         if (known) {
             EXPECT_NEAR(out.standard_error[0] / std::sqrt(10.0 / 4), 1, 0x1p-46 * weight + 0x1p-20);
         }
+        EXPECT_TRUE(std::isfinite(outweighed(weight, Weights::samples).standard_error[0]))
+            << "planted fault: no bar beside any such weight";
     }
 }
 

@@ -2,12 +2,12 @@
 #include <ImfStringAttribute.h>
 #include <gtest/gtest.h>
 #include <png.h>
-#include <sys/stat.h>
 
 #include <cmath>
 #include <limits>
 
 #include "clratio/image.hpp"
+#include "support/cycles.hpp"
 #include "support/exr.hpp"
 #include "support/tool.hpp"
 
@@ -15,28 +15,6 @@ using namespace clratio;
 using namespace clratio::test;
 
 namespace {
-
-const std::string cycles = CLRATIO_TEST_DATA "/cycles/";
-
-Words files(const std::string& scene, const char* kind, int count) {
-    Words all;
-    for (int k = 0; k < count; ++k) all.push_back(cycles + scene + "/" + kind + "_00" + std::to_string(k % 8) + ".exr");
-    return all;
-}
-
-Words pairs(const std::string& scene, int count) {
-    return Words{"combine", "--m"} + files(scene, "m", count) + Words{"--t"} + files(scene, "t", count);
-}
-
-std::string reference(const std::string& scene, const char* kind) { return cycles + scene + "/" + kind + "_ref.exr"; }
-
-Image made(int width, int height, float value) {
-    Image image;
-    image.channels = {"R", "G", "B"};
-    image.data_window = image.display_window = {0, 0, width - 1, height - 1};
-    image.values.assign(3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height), value);
-    return image;
-}
 
 // The value that eq. (10) gives in double for the means of the files; zero denominators give 0.
 std::vector<double> ratio_in_double(const Words& m, const Words& t, const Image& tau) {
@@ -330,47 +308,12 @@ TEST(Tool, usage_errors_exit_2) {
     expect_refused(numbered + Words{"--needed", "n.exr", "--target", "nan"}, 2, "--target: expected a number above 0");
 }
 
-TEST(Tool, outputs_replace_neither_inputs_nor_each_other_nor_a_state) {
-    const Scratch scratch;
-    const std::string m = scratch / "m.exr", t = scratch / "t.exr", state = scratch / "s.exr", o = scratch / "o.exr";
-    std::filesystem::copy(files("area", "m", 1)[0], m);
-    std::filesystem::copy(files("area", "t", 1)[0], t);
-    const Words batch{"combine", "--m", m, "--t", t, "--tau", "1"};
-    answer(Words{"combine", "--m", m, "--t", t, "--state", state});
-    const std::string old = bytes_of(m), sums = bytes_of(state);
-    expect_refused(batch + Words{"-o", scratch / "./m.exr"}, 2, "an input, and an output");
-    expect_refused(batch + Words{"-o", o, "--flags", t}, 2, "an input, and an output");
-    expect_refused(batch + Words{"-o", o, "--stderr", scratch / "./o.exr"}, 2, "named for two outputs");
-    expect_refused(batch + Words{"-o", state}, 2, "holds a state");
-    expect_refused({"picture", m, "-o", scratch / "./m.exr"}, 2, "an input, and the output");
-    EXPECT_EQ(bytes_of(m), old);
-    EXPECT_EQ(bytes_of(state), sums);
-    EXPECT_EQ(scratch.files(), 3u);
-}
-
 TEST(Tool, a_glob_that_takes_the_reference_for_a_batch_is_refused) {
     const Words all = Words{"combine", "--m", reference("area", "m")} + files("area", "m", 1) +
                       Words{"--t", reference("area", "t")} + files("area", "t", 1) + Words{"-o", "o.exr"};
     expect_refused(all + Words{"--tau", reference("area", "t")}, 2, "a batch of --t, and the --tau");
     expect_refused(all + Words{"--tau", "1", "--reference", reference("area", "m")}, 2,
                    "a batch of --m, and the --reference");
-}
-
-TEST(Tool, outputs_go_to_files_alone) {
-    const Scratch scratch;
-    const std::string pipe = scratch / "pipe";
-    ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
-    const Words one{files("area", "m", 1)[0]};
-    for (const std::string& place : {pipe, scratch / "."}) {
-        expect_refused(pairs("area", 1) + Words{"--tau", "1", "-o", place}, 1, "exists and is not a regular file");
-        expect_refused(Words{"picture"} + one + Words{"-o", place}, 1, "exists and is not a regular file");
-    }
-    EXPECT_TRUE(std::filesystem::is_fifo(pipe));
-    std::filesystem::create_symlink("real.png", scratch / "link.png");
-    EXPECT_EQ(clratio_tool(Words{"picture"} + one + Words{"-o", scratch / "link.png"}).code, 0);
-    EXPECT_TRUE(std::filesystem::is_regular_file(scratch / "real.png"));
-    std::filesystem::create_symlink("loop.png", scratch / "loop.png");
-    expect_refused(Words{"picture"} + one + Words{"-o", scratch / "loop.png"}, 1, "cannot be written");
 }
 
 TEST(Tool, errors_exit_1_and_name_the_file) {
@@ -404,23 +347,6 @@ TEST(Tool, errors_exit_1_and_name_the_file) {
     expect_refused({"compare", none, m}, 1, none);
     expect_refused({"picture", none, "-o", scratch / "p.png"}, 1, none);
     expect_refused({"picture", m, "-o", scratch / "no/p.png"}, 1, scratch / "no/p.png");
-}
-
-TEST(Tool, a_full_disk_exits_1_and_keeps_the_old_file) {
-    const Scratch scratch;
-    const std::string out = scratch / "o.exr";
-    const Words words = pairs("area", 1) + Words{"--tau", "1", "-o", out};
-    answer(words);
-    const std::string old = clratio::test::bytes_of(out);
-    expect_refused(words, 1, out + ": cannot be written: File too large", {.file_size_limit = old.size() - 1});
-    EXPECT_EQ(clratio::test::bytes_of(out), old);
-    EXPECT_EQ(scratch.files(), 1u);
-}
-
-TEST(Tool, a_full_standard_output_exits_1) {
-    const Said said = clratio_tool({"compare", reference("area", "m"), reference("area", "m")}, {.out = "/dev/full"});
-    EXPECT_EQ(said.code, 1);
-    expect_in("standard output", said.err);
 }
 
 TEST(Tool, compare_computes_what_it_says) {
@@ -564,19 +490,6 @@ TEST(Tool, picture_draws_srgb_side_by_side) {
     expect_refused({"picture", scratch / "a.exr", "-o", scratch / "p.png", "--titles", "a,b"}, 2, "2 titles for 1 images");
 }
 
-TEST(Tool, no_output_replaces_a_state) {
-    const Scratch scratch;
-    const std::string state = scratch / "s.exr", image = scratch / "o.exr";
-    answer(pairs("area", 1) + Words{"--tau", "1", "-o", image, "--state", state});
-    const std::string before = bytes_of(state);
-    expect_refused({"picture", image, "-o", state}, 2, "s.exr: holds a state");
-    const Said csv = clratio_tool(
-        {"errors", "--mu", ".5", "--tau", "1", "--sigma-m", ".5", "--sigma-t", ".35", "--count", "1e3", "--csv", state});
-    EXPECT_EQ(csv.code, 2) << csv.err;
-    EXPECT_EQ(bytes_of(state), before);
-    EXPECT_EQ(clratio_tool({"picture", image, "-o", scratch / "p.png"}).code, 0) << "planted fault: any file is a state";
-}
-
 TEST(Tool, numbers_are_read_strictly_and_names_need_not_be_text) {
     const Words law{"law", "--mu", ".5", "--tau", "1", "--sigma-m", "1", "--sigma-t", ".35", "--x", "0"};
     expect_refused(law + Words{"--n", "-1"}, 2, "--n: expected a whole number from 0 on, got -1");
@@ -591,25 +504,4 @@ TEST(Tool, numbers_are_read_strictly_and_names_need_not_be_text) {
 TEST(Tool, an_empty_name_is_refused) {
     expect_refused(pairs("area", 1) + Words{"--tau", "", "-o", "never.exr"}, 2, "--tau: expected a text, got nothing");
     expect_refused({"compare", "", "ref.exr"}, 2, "expected a text, got nothing");
-}
-
-TEST(Tool, a_name_may_be_as_long_as_the_system_lets_it) {
-    const Scratch scratch;
-    const std::string longest = std::string(251, 'x');
-    const std::string image = scratch / longest + ".exr", png = scratch / longest + ".png";
-    const Words job =
-        pairs("area", 1) + Words{"--tau", "1", "-o", image, "--state", scratch / ("s" + image.substr(image.size() - 254))};
-    EXPECT_EQ(clratio_tool(job).code, 0);
-    EXPECT_EQ(clratio_tool({"picture", image, "-o", png}).code, 0);
-    EXPECT_EQ(scratch.files(), 3u) << "nothing else is left";
-    expect_refused({"picture", image, "-o", scratch / longest + "x.png"}, 1, "too long");
-}
-
-TEST(Tool, render_refuses_a_folder_with_batches_of_another_render) {
-    const Scratch scratch;
-    const Words render{"render", "louvres", "--size", "8x6", "-o", scratch / "r"};
-    ASSERT_EQ(clratio_tool(render + Words{"--batches", "3"}).code, 0);
-    EXPECT_EQ(clratio_tool(render + Words{"--batches", "3", "--seed", "5"}).code, 0) << "its own files it replaces";
-    expect_refused(render + Words{"--batches", "2"}, 1, "_002.exr: is of another render");
-    expect_refused(render, 1, "is of another render");
 }
