@@ -41,12 +41,6 @@ void check_size(const char* name, std::uint64_t size, std::uint64_t expected) {
     if (size != expected) throw InvalidArgument(name, std::to_string(expected) + " values", std::to_string(size));
 }
 
-/// tau on the device, as long as the call needs it.
-struct DeviceTau {
-    Buffer buffer;
-    View view;
-};
-
 void check_tau(const Tau& tau, std::uint64_t count) {
     if (tau.numbers.empty()) return check_size("tau", tau.image.size(), count);
     for (float x : tau.numbers)
@@ -54,21 +48,6 @@ void check_tau(const Tau& tau, std::uint64_t count) {
     if (count % tau.channels != 0)
         throw InvalidArgument("tau", "as many numbers as channels",
                               std::to_string(tau.channels) + " for " + std::to_string(count) + " values");
-}
-
-DeviceTau put(const Engine& engine, const Tau& tau, std::uint64_t count) {
-    check_tau(tau, count);
-    if (tau.numbers.empty()) {
-        Buffer b = Buffer::from_host(engine, std::as_bytes(tau.image));
-        return {b, {b.mem(), 0, count}};
-    }
-    Buffer b(engine, tau.numbers.size() * sizeof(float));
-    b.write(std::as_bytes(std::span(tau.numbers)));
-    return {b, {b.mem(), 0, count, 0, tau.channels}};
-}
-
-Tau slice(const Tau& tau, std::uint64_t begin, std::uint64_t size) {
-    return tau.numbers.empty() ? Tau(tau.image.subspan(begin, size)) : tau;
 }
 
 std::vector<HostBatch> slices(std::span<const HostBatch> batches, std::uint64_t begin, std::uint64_t size) {
@@ -102,14 +81,16 @@ Combined sized(std::uint64_t count, const CombineOptions& options, Combined reus
     return reuse;
 }
 
-/// Device buffers on `count` values of a result from `begin` on.
-class HostOutput {
+/// Device buffers on `count` values of tau and of a result from `begin` on. The estimate may lie in tau's own memory.
+class HostReading {
 public:
-    HostOutput(const Engine& engine, Combined& result, std::uint64_t begin, std::uint64_t count)
+    HostReading(const Engine& engine, Combined& result, const Tau& tau, std::uint64_t begin, std::uint64_t count)
         : engine_(engine), begin_(begin), count_(count), result_(result),
           rows_(Buffer::zeroed(engine, most_work_items(engine) * CLR_TALLY_FLAGS * sizeof(std::uint64_t))) {
         const auto view = [&](std::vector<float>& values) { return View{place(values), 0, count}; };
-        out_.estimate = view(result.estimate);
+        const bool over_tau = tau.image.data() == result.estimate.data();
+        out_.estimate = {place(result.estimate, over_tau ? Buffer::over_host : Buffer::onto_host), 0, count};
+        tau_ = over_tau ? out_.estimate : put(tau);
         out_.flags = place(result.flag_image);
         out_.standard_error = view(result.standard_error);
         out_.bias = view(result.bias);
@@ -119,10 +100,13 @@ public:
         out_.gain = view(result.gain);
         out_.needed = view(result.needed);
     }
+    HostReading(const Engine& engine, Combined& result, const Tau& tau)
+        : HostReading(engine, result, tau, 0, result.estimate.size()) {}
 
+    const View& tau() const { return tau_; }
     const CombineOutput& output() const { return out_; }
-    Reading reading(const View& tau, const CombineOptions& options) const { return {tau, out_, options, rows_.mem()}; }
     cl_mem rows() const { return rows_.mem(); }
+    Reading reading(const CombineOptions& options) const { return {tau_, out_, options, rows_.mem()}; }
 
     /// Once the kernels are done.
     void publish() {
@@ -132,19 +116,28 @@ public:
     }
 
 private:
-    template <class T> cl_mem place(std::vector<T>& values) {
+    View put(const Tau& tau) {
+        if (tau.numbers.empty()) {
+            tau_memory_ = Buffer::from_host(engine_, std::as_bytes(tau.image.subspan(begin_, count_)));
+            return {tau_memory_.mem(), 0, count_};
+        }
+        tau_memory_ = Buffer::copy_of(engine_, std::as_bytes(std::span(tau.numbers)));
+        return {tau_memory_.mem(), 0, count_, 0, tau.channels};
+    }
+
+    template <class T> cl_mem place(std::vector<T>& values, decltype(Buffer::onto_host)& on = Buffer::onto_host) {
         if (values.empty()) return nullptr;
-        const auto part = std::span(values).subspan(begin_, count_);
-        buffers_.push_back(Buffer::onto_host(engine_, std::as_writable_bytes(part)));
+        buffers_.push_back(on(engine_, std::as_writable_bytes(std::span(values).subspan(begin_, count_))));
         return buffers_.back().mem();
     }
 
     Engine engine_;
     std::uint64_t begin_, count_;
     Combined& result_;
+    View tau_;
     CombineOutput out_;
     std::vector<Buffer> buffers_;
-    Buffer rows_;
+    Buffer tau_memory_, rows_;
 };
 
 /// A program for everything where more than estimate, error and flags is asked: else there would be too many.
@@ -348,11 +341,11 @@ Combined combine(const Engine& engine, std::span<const float> m, std::span<const
     check_stateless(options);
     if (t.size() != m.size()) throw InvalidArgument("t", std::to_string(m.size()) + " values", std::to_string(t.size()));
     if (m.empty()) return {};
-    const DeviceTau control = put(engine, tau, m.size());
+    check_tau(tau, m.size());
     const Buffer mb = Buffer::from_host(engine, std::as_bytes(m)), tb = Buffer::from_host(engine, std::as_bytes(t));
     Combined result = sized(m.size(), options, {});
-    HostOutput out(engine, result, 0, m.size());
-    wait(read_means(engine, {mb.mem(), 0, m.size()}, {tb.mem(), 0, m.size()}, control.view, out.output(), out.rows(),
+    HostReading out(engine, result, tau);
+    wait(read_means(engine, {mb.mem(), 0, m.size()}, {tb.mem(), 0, m.size()}, out.tau(), out.output(), out.rows(),
                     options.zero, {}));
     out.publish();
     return result;
@@ -368,10 +361,10 @@ cl_event combine(const Moments& moments, View tau, const CombineOutput& out, Com
 
 Combined combine(const Moments& moments, const Tau& tau, CombineOptions options, Combined reuse) {
     check_estimator(options, moments.options());
-    const DeviceTau control = put(moments.engine(), tau, moments.size());
+    check_tau(tau, moments.size());
     Combined result = sized(moments.size(), options, std::move(reuse));
-    HostOutput out(moments.engine(), result, 0, moments.size());
-    wait(read_moments(moments, out.reading(control.view, options), {}));
+    HostReading out(moments.engine(), result, tau);
+    wait(read_moments(moments, out.reading(options), {}));
     out.publish();
     return result;
 }
@@ -381,12 +374,12 @@ Combined add_and_combine(Moments& moments, std::span<const HostBatch> batches, c
     auto& s = moments.state();
     check_estimator(options, s.options);
     if (batches.empty()) throw InvalidArgument("batches", "at least 1", "0");
-    const DeviceTau control = put(s.engine, tau, s.values);
+    check_tau(tau, s.values);
     const OnDevice in = put_on_device(s.engine, s.values, s.options.nonfinite, batches);
     check_room(s.batches(), batches.size());
     Combined result = sized(s.values, options, std::move(reuse));
-    HostOutput out(s.engine, result, 0, s.values);
-    const Reading reading = out.reading(control.view, options);
+    HostReading out(s.engine, result, tau);
+    const Reading reading = out.reading(options);
     const auto all = std::span<const Batch>(in.batches);
     if (fuses(s, reading)) {
         const std::size_t fused = std::min<std::size_t>(all.size(), CLR_BATCHES_PER_LAUNCH);
@@ -427,7 +420,7 @@ cl_event combine_batches(const Engine& engine, std::span<const Batch> batches, V
 }
 
 Combined combine_batches(const Engine& engine, std::span<const HostBatch> batches, const Tau& tau, CombineOptions options,
-                         BatchOptions how) {
+                         BatchOptions how, Combined reuse) {
     check_one_launch(batches.size());
     const MomentsOptions state = state_for(options, how);
     check_estimator(options, state);
@@ -437,15 +430,14 @@ Combined combine_batches(const Engine& engine, std::span<const HostBatch> batche
         check_size("t", b.t.size(), count);
     }
     check_tau(tau, count);
-    Combined result = sized(count, options, {});
+    Combined result = sized(count, options, std::move(reuse));
     const std::uint64_t most = values_in_a_part(engine, tau);
     for (std::uint64_t begin = 0; begin < count; begin += most) {
         const std::uint64_t size = std::min(most, count - begin);
         const OnDevice in = put_on_device(engine, size, state.nonfinite, slices(batches, begin, size));
-        const DeviceTau control = put(engine, slice(tau, begin, size), size);
-        HostOutput out(engine, result, begin, size);
+        HostReading out(engine, result, tau, begin, size);
         const Buffer rows = rows_for_adding(engine);
-        wait(read_batches(engine, in.batches, state, out.reading(control.view, options), rows, {}));
+        wait(read_batches(engine, in.batches, state, out.reading(options), rows, {}));
         out.publish();
         result.negatives += sums_of_rows<CLR_TALLY_ADD>(rows)[CLR_TALLY_NEGATIVE];
     }

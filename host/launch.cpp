@@ -70,13 +70,12 @@ Buffer Buffer::zeroed(const Engine& engine, std::size_t bytes) {
     return b;
 }
 
-Buffer Buffer::from_host(const Engine& engine, std::span<const std::byte> bytes) {
+Buffer Buffer::from_host(const Engine& engine, std::span<const std::byte> bytes, cl_mem_flags access) {
     Buffer b;
     const bool in_place = engine.info().host_memory && !bytes.empty();
     const cl_mem_flags use = bytes.empty() ? 0 : in_place ? CL_MEM_USE_HOST_PTR : CL_MEM_COPY_HOST_PTR;
     b.queue_ = engine.state().queue;
-    b.memory_ = allocate(engine, CL_MEM_READ_ONLY | use, bytes.size(),
-                         bytes.empty() ? nullptr : const_cast<std::byte*>(bytes.data()));
+    b.memory_ = allocate(engine, access | use, bytes.size(), bytes.empty() ? nullptr : const_cast<std::byte*>(bytes.data()));
     b.size_ = bytes.size();
     return b;
 }
@@ -91,12 +90,17 @@ Buffer Buffer::copy_of(const Engine& engine, std::span<const std::byte> bytes) {
 }
 
 Buffer Buffer::onto_host(const Engine& engine, std::span<std::byte> bytes) {
+    if (engine.info().host_memory) return over_host(engine, bytes);
     Buffer b;
-    const bool in_place = engine.info().host_memory && !bytes.empty();
     b.queue_ = engine.state().queue;
-    b.memory_ = allocate(engine, CL_MEM_READ_WRITE | (in_place ? CL_MEM_USE_HOST_PTR : cl_mem_flags{0}), bytes.size(),
-                         in_place ? bytes.data() : nullptr);
+    b.memory_ = allocate(engine, CL_MEM_READ_WRITE, bytes.size(), nullptr);
     b.size_ = bytes.size();
+    b.host_ = bytes;
+    return b;
+}
+
+Buffer Buffer::over_host(const Engine& engine, std::span<std::byte> bytes) {
+    Buffer b = from_host(engine, bytes, CL_MEM_READ_WRITE);
     b.host_ = bytes;
     return b;
 }

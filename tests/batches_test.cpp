@@ -129,6 +129,34 @@ TEST(Batches, what_does_not_fit_is_done_in_parts) {
     EXPECT_GT(got.negatives, 0u);
 }
 
+// Also on a device that copies, and where the image is done in parts.
+TEST(Batches, the_estimate_may_take_the_place_of_tau) {
+    const Input in(3);
+    const Engine whole, parts, copying;
+    parts.state().info.largest_allocation = 4096;
+    copying.state().info.host_memory = false;
+    const auto over = [](std::vector<float> image, auto combined) {
+        const Tau tau{std::span<const float>(image)};
+        Combined place;
+        place.estimate = std::move(image);
+        const Combined got = combined(tau, std::move(place));
+        EXPECT_EQ(got.estimate.data(), tau.image.data());
+        return bits(got);
+    };
+    for (const Engine* engine : {&whole, &parts, &copying}) {
+        const auto at_once = [&](const Tau& tau, Combined place) {
+            return combine_batches(*engine, in.batches(), tau, {}, {}, std::move(place));
+        };
+        const auto want = bits(combine_batches(*engine, in.batches(), in.control()));
+        EXPECT_EQ(over(in.tau, at_once), want);
+        EXPECT_NE(over(in.m[1], at_once), want) << "planted fault: another tau";
+    }
+    Moments sum(copying, values);
+    sum.add(in.batches());
+    const auto read_out = [&](const Tau& tau, Combined place) { return combine(sum, tau, {}, std::move(place)); };
+    EXPECT_EQ(over(in.tau, read_out), bits(combine(sum, in.control())));
+}
+
 TEST(Batches, views_may_have_gaps_and_the_result_may_stand_on_an_input) {
     const Engine engine;
     const Input in(2, 999);

@@ -138,7 +138,8 @@ Combined combine(const Engine& engine, std::span<const float> m, std::span<const
 /// all others; Fieller 1940.
 cl_event combine(const Moments& moments, View tau, const CombineOutput& out, CombineOptions options = {},
                  std::span<const cl_event> wait_list = {});
-/// The memory of `reuse`, an earlier result, is taken for this one.
+/// The memory of `reuse` is taken for this result: that of an earlier one, or, as its estimate, of tau's own image, which
+/// the estimate then takes the place of.
 Combined combine(const Moments& moments, const Tau& tau, CombineOptions options = {}, Combined reuse = {});
 
 /// Adds batches and reads out; ratio, mean and mean of ratios of a state without groups in the pass that adds the last 8
@@ -166,8 +167,8 @@ struct BatchOptions {
 /// over groups. Cost: 8 bytes a value and batch, tau, and what is written.
 cl_event combine_batches(const Engine& engine, std::span<const Batch> batches, View tau, const CombineOutput& out,
                          CombineOptions options = {}, BatchOptions how = {}, std::span<const cl_event> wait_list = {});
-/// Of any size: what does not fit into one allocation of the device is done in parts.
+/// Of any size: what does not fit into one allocation of the device is done in parts. `reuse` as above.
 Combined combine_batches(const Engine& engine, std::span<const HostBatch> batches, const Tau& tau,
-                         CombineOptions options = {}, BatchOptions how = {});
+                         CombineOptions options = {}, BatchOptions how = {}, Combined reuse = {});
 
 }  // namespace clratio

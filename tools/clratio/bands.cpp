@@ -142,9 +142,11 @@ ReadOut Bands::read_out(const Tau& tau, const Wanted& wanted) const {
 }
 
 ReadOut read_at_once(const clratio::Engine& engine, std::span<const HostBatch> batches, const Tau& tau, const Wanted& wanted,
-                     const clratio::BatchOptions& how) {
-    ReadOut out{clratio::combine_batches(engine, batches, tau, wanted.options, how), {}};
+                     const clratio::BatchOptions& how, std::vector<float> place) {
+    ReadOut out;
     if (wanted.mean) out.mean = clratio::combine_batches(engine, batches, tau, plain_mean(wanted.options), how);
+    out.chosen.estimate = std::move(place);
+    out.chosen = clratio::combine_batches(engine, batches, tau, wanted.options, how, std::move(out.chosen));
     return out;
 }
 

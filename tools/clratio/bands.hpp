@@ -29,9 +29,10 @@ struct Sums {
 /// Of a state that was kept.
 Sums sums_of(const clratio::Snapshot& snapshot);
 
-/// Of 1 to 8 batches that are all there are, without moments: the same bits.
+/// Of 1 to 8 batches that are all there are, without moments: the same bits. The estimate takes the memory of `place`, which
+/// may be tau's own image.
 ReadOut read_at_once(const clratio::Engine& engine, std::span<const clratio::HostBatch> batches, const clratio::Tau& tau,
-                     const Wanted& wanted, const clratio::BatchOptions& how);
+                     const Wanted& wanted, const clratio::BatchOptions& how, std::vector<float> place = {});
 
 class Bands {
 public:

@@ -76,6 +76,8 @@ public:
     void fit(const clratio::Image& shape);
 
     operator clratio::Tau() const;
+    /// The image, once nothing else will read it; a Tau made before still refers to it. None where tau is a number.
+    std::vector<float> give_away() { return std::move(image_.values); }
     double seconds() const { return files_.seconds(); }  ///< spent reading
 
 private:

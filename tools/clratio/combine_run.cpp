@@ -173,8 +173,9 @@ void CombineRun::read_out_at_once(const std::vector<Pair>& pairs) {
     if (accepted.misfit) std::rethrow_exception(accepted.misfit);
     for (const Pair& pair : pairs) keeper_.added(pair);
     const clratio::BatchOptions how{sums_.moments.nonfinite, sums_.moments.weights};
+    const clratio::Tau tau = tau_;  // a large image takes as long to find new memory as to be combined
     write(timed(report_.seconds.device,
-                [&] { return read_at_once(engine_, accepted.batches, tau_, options_.wanted(), how); }));
+                [&] { return read_at_once(engine_, accepted.batches, tau, options_.wanted(), how, tau_.give_away()); }));
 }
 
 void CombineRun::save() {
