@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -72,8 +73,9 @@ bool store(const std::filesystem::path& path, const std::string& key, const std:
     const std::uint64_t sum = fnv1a(all.data(), all.size());
     append(all, &sum, sizeof sum);
 
+    static std::atomic<unsigned> stored{0};
     auto temporary = path;
-    temporary += "." + std::to_string(getpid());
+    temporary += "." + std::to_string(getpid()) + "." + std::to_string(stored++);
     std::ofstream out(temporary, std::ios::binary);
     out.write(reinterpret_cast<const char*>(all.data()), static_cast<std::streamsize>(all.size()));
     out.close();

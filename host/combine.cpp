@@ -205,7 +205,12 @@ bool fuses(const Moments::State& s, const Reading& reading) {
            static_cast<std::uint32_t>(reading.options.estimator) <= CLR_ESTIMATOR_MEAN_OF_RATIOS;
 }
 
+void check_zero(Zero zero) {
+    if (zero > Zero::one) throw InvalidArgument("zero", "a policy of Zero", std::to_string(static_cast<int>(zero)));
+}
+
 void check_stateless(const CombineOptions& options) {
+    check_zero(options.zero);
     if (options.estimator != Estimator::ratio)
         throw InvalidArgument("estimator", "ratio, for means without a history", "another; add the batches to Moments");
     if (options.standard_error || options.bias || options.interval || options.gain || options.needed)
@@ -233,8 +238,7 @@ void check_estimator(const CombineOptions& options, const MomentsOptions& state)
     };
     if (needs.ratios && !state.ratios) refuse(".ratios = true");
     if (needs.groups && state.groups < 2) refuse(".groups of 2 to 16");
-    if (options.zero > Zero::one)
-        throw InvalidArgument("zero", "a policy of Zero", std::to_string(static_cast<int>(options.zero)));
+    check_zero(options.zero);
     if (options.method > IntervalMethod::fieller)
         throw InvalidArgument("method", "one of IntervalMethod", std::to_string(static_cast<std::uint32_t>(options.method)));
     if (!(options.level > 0 && options.level < 1))
@@ -251,9 +255,7 @@ void Reading::check(std::uint64_t count, std::span<const std::pair<const char*, 
     read.emplace_back("tau", tau);
     const auto output = [&](const char* name, const View& v) {
         if (!v.mem) return;
-        check_view(name, v, count);
-        if (v.stride < v.channels)
-            throw InvalidArgument(name, "a stride of at least its channels", std::to_string(v.stride));
+        check_output(name, v, count);
         for (const auto& [other_name, other] : read) check_overlap(name, v, other_name, other);
         for (const auto& [other_name, other] : written) check_apart(name, v, other_name, other);
         written.emplace_back(name, v);
@@ -381,6 +383,7 @@ Combined add_and_combine(Moments& moments, std::span<const HostBatch> batches, c
     HostReading out(s.engine, result, tau);
     const Reading reading = out.reading(options);
     const auto all = std::span<const Batch>(in.batches);
+    const Joined joined(s.last);
     if (fuses(s, reading)) {
         const std::size_t fused = std::min<std::size_t>(all.size(), CLR_BATCHES_PER_LAUNCH);
         add_batches(s, all.first(all.size() - fused), {});

@@ -22,12 +22,6 @@ void check_range(std::uint64_t first, std::uint64_t count);
 /// Refuses a law that is not finite, or whose s or b is negative.
 void check_law(const Canonical& law);
 
-/// Refuses views without memory or that do not fit their buffer; `name` is the argument's.
-void check_elements(const View& view, std::size_t element_bytes, const char* name);
-
-/// The same, and views that overlap themselves.
-void check_output(const View& out, std::size_t element_bytes);
-
 void require_fp64(const Engine& engine, const char* what);
 
 /// The build option that fixes a kernel's generator.

@@ -103,10 +103,13 @@ bool matches(const Found& f, const std::string& wish) {
     return lower(f.info.name).find(wish) != std::string::npos;
 }
 
+std::string kind(const Found& f) {
+    return is(f, CL_DEVICE_TYPE_GPU) ? "gpu" : is(f, CL_DEVICE_TYPE_CPU) ? "cpu" : "accelerator";
+}
+
 std::string ids(const std::vector<Found>& found) {
     std::string s;
-    for (const auto& f : found)
-        s += (s.empty() ? "" : ", ") + f.info.id + (is(f, CL_DEVICE_TYPE_GPU) ? " (gpu, " : " (cpu, ") + f.info.name + ")";
+    for (const auto& f : found) s += (s.empty() ? "" : ", ") + f.info.id + " (" + kind(f) + ", " + f.info.name + ")";
     return s;
 }
 
@@ -136,7 +139,13 @@ void choose_shape(Engine::State& s) {
     s.grouped = o.path == EngineOptions::Path::groups || (o.path == EngineOptions::Path::automatic && !cpu);
     s.width = o.width ? o.width : s.grouped ? 1 : s.info.preferred_width;
     s.wide = o.width == 0 && !s.grouped && s.width >= 8 && is_pocl(s.info) ? 2 * s.width : s.width;
-    s.work_items = o.work_items ? o.work_items : s.grouped ? 64 : 8 * std::max(1u, s.info.compute_units);
+    const auto most = number<std::size_t>(s.device, CL_DEVICE_MAX_WORK_GROUP_SIZE);
+    if (s.grouped && o.work_items > most)
+        throw InvalidArgument("work_items", "at most " + std::to_string(most) + " in a group on " + s.info.name,
+                              std::to_string(o.work_items));
+    const std::uint32_t usual =
+        s.grouped ? static_cast<std::uint32_t>(std::min<std::size_t>(most, 64)) : 8 * std::max(1u, s.info.compute_units);
+    s.work_items = o.work_items ? o.work_items : usual;
 }
 
 void refuse_other_bits(const Engine& engine) {

@@ -95,7 +95,7 @@ cl_event error_samples(const Engine& engine, const Canonical& law, const Stream&
                        std::span<const cl_event> wait_list) {
     check_law(law);
     check_range(first, out.count);
-    check_output(out, sizeof(float));
+    check_output("out", out, out.count);
     const auto blocks = blocks_of(first, std::max<std::uint64_t>(1, out.count), 2, engine.width());
     return samples(engine, "clr_error_samples", to_float(law), blocks, stream, first, out, wait_list);
 }
@@ -105,7 +105,7 @@ cl_event error_samples_double(const Engine& engine, const Canonical& law, const 
     check_law(law);
     require_fp64(engine, "double samples");
     check_range(first, out.count);
-    check_output(out, sizeof(double));
+    check_output("out", out, out.count, sizeof(double));
     const auto blocks = blocks_of(first, std::max<std::uint64_t>(1, out.count), 1, engine.width());
     return samples(engine, "clr_error_samples_double", law, blocks, stream, first, out, wait_list);
 }

@@ -298,6 +298,7 @@ void FixedMoments::add(std::span<const HostBatch> batches) {
         views.push_back({m, t, b.weight});
     }
     if (s.options.nonfinite == NonFinite::fail) refuse_what_does_not_fit(s, views);
+    const Joined joined(s.last);
     wait(add_all(s, std::move(views), {}));
 }
 
@@ -343,12 +344,12 @@ cl_event FixedMoments::moments(Moments& into, std::span<const cl_event> wait_lis
     State& s = *state_;
     check_target(s, into);
     Moments::State& to = into.state();
-    to.groups.front() = {s.batches, device::clr_fixed_weight(s.weight)};
     Launch launch(s.engine, "fixed", "clr_read_fixed");
     s.give_planes(launch).arg(s.rows);
     to.give_planes(launch).arg(to.state_of(0)).arg(to.add_rows).arg(most_work_items(s.engine));
     s.last = launch.after(wait_list).after(std::array{s.last.get(), to.last.get()}).run_ranges(s.values);
     to.last = s.last;
+    to.groups.front() = {s.batches, device::clr_fixed_weight(s.weight)};
     return Event(s.last).give();
 }
 

@@ -275,7 +275,7 @@ ErrorHistogram error_histogram(const Engine& engine, const Canonical& law, const
 Histogram histogram(const Engine& engine, View values, Bins bins, std::span<const cl_event> wait_list) {
     const auto on_device = device_bins<float>(bins);
     check_result(engine, 1, slots_of(bins));
-    check_elements(values, sizeof(float), "values");
+    check_view("values", values, values.count);
     const Tasks tasks(engine, slots_of(bins));
     const std::uint64_t parts = tasks.parts(1);
     std::vector<std::uint64_t> row(tasks.slots);

@@ -62,16 +62,16 @@ void verify(const fs::path& path, const Planes& wanted) {
 }
 
 void write(const fs::path& path, const Planes& planes, const WriteOptions& options) {
-    FileOutput stream(output_target(path));
+    ExrStream stream(output_target(path));
     {
         Imf::OutputFile file(stream, header_of(planes, options));
         file.setFrameBuffer(planes.frame());
         file.writePixels(planes.shape.height());
     }
-    stream.begin_sync();
-    verify(stream.path(), planes);
-    stream.close_synced();
-    stream.rename_to_target();
+    stream.file().begin_sync();
+    verify(stream.file().path(), planes);
+    stream.file().close_synced();
+    stream.file().rename_to_target();
 }
 
 void write_checked(const fs::path& path, const Planes& planes, const WriteOptions& options) {

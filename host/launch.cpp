@@ -147,15 +147,24 @@ std::size_t most_work_items(const Engine& engine) {
 
 device::clr_layout layout(const View& v) { return {v.offset, v.stride, v.channels}; }
 
-void check_view(const char* name, const View& view, std::uint64_t count) {
+void check_view(const char* name, const View& view, std::uint64_t count, std::size_t element_bytes) {
     if (!view.mem) throw InvalidArgument(name, "a device buffer", "null");
     if (view.count != count) throw InvalidArgument(name, std::to_string(count) + " values", std::to_string(view.count));
     if (view.channels == 0) throw InvalidArgument(name, "at least one channel", "0");
     std::size_t bytes = 0;
     check(clGetMemObjectInfo(view.mem, CL_MEM_SIZE, sizeof bytes, &bytes, nullptr), "clGetMemObjectInfo");
-    if (!view.fits(bytes / sizeof(float)))
-        throw InvalidArgument(name, "a view inside its buffer of " + std::to_string(bytes / sizeof(float)) + " elements",
-                              "one of " + std::to_string(view.count) + " values that ends at " + std::to_string(view.end()));
+    const std::size_t elements = bytes / element_bytes;
+    if (!view.fits(elements))
+        throw InvalidArgument(name, "a view inside its buffer of " + std::to_string(elements) + " elements",
+                              "one of " + std::to_string(view.count) + " values from " + std::to_string(view.offset) +
+                                  " on");
+}
+
+void check_output(const char* name, const View& view, std::uint64_t count, std::size_t element_bytes) {
+    check_view(name, view, count, element_bytes);
+    if (view.stride < view.channels)
+        throw InvalidArgument(name, "a stride of at least its " + std::to_string(view.channels) + " channels",
+                              std::to_string(view.stride));
 }
 
 void check_apart(const char* name, const View& output, const char* other_name, const View& other) {

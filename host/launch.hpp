@@ -50,11 +50,26 @@ device::clr_layout layout(const View& view);
 std::size_t most_work_items(const Engine& engine);
 
 /// Throws InvalidArgument unless the view holds `count` values inside its buffer.
-void check_view(const char* name, const View& view, std::uint64_t count);
+void check_view(const char* name, const View& view, std::uint64_t count, std::size_t element_bytes = sizeof(float));
+/// The same, and where pixels lie among each other.
+void check_output(const char* name, const View& view, std::uint64_t count, std::size_t element_bytes = sizeof(float));
 /// Throws InvalidArgument where the elements of two outputs lie among each other.
 void check_apart(const char* name, const View& output, const char* other_name, const View& other);
 /// Throws InvalidArgument where an output shares elements with another view without being the same view.
 void check_overlap(const char* name, const View& output, const char* other_name, const View& other);
+
+/// Waits for the last launch of a state when its scope ends, also by an exception: launches read their caller's memory.
+class Joined {
+public:
+    explicit Joined(const Event& last) : last_(last) {}
+    Joined(const Joined&) = delete;
+    ~Joined() {
+        if (const cl_event event = last_.get()) clWaitForEvents(1, &event);
+    }
+
+private:
+    const Event& last_;
+};
 
 /// The sums of counters that each work-item keeps a row of.
 template <std::size_t columns> std::array<std::uint64_t, columns> sums_of_rows(const Buffer& rows) {

@@ -49,9 +49,7 @@ Event fill(const Engine& engine, Law law, Quantity q, std::span<const ErrorModel
     const auto terms = device_models(law, q, models);
     const std::uint64_t points = points_of(models.size(), x.count, out.count);
     check_view("x", x, x.count);
-    check_view("out", out, out.count);
-    if (out.stride < out.channels)
-        throw InvalidArgument("out", "a stride of at least its channels", std::to_string(out.stride));
+    check_output("out", out, out.count);
     check_overlap("out", out, "x", x);
     if (x.mem == out.mem && x.count != out.count)
         throw InvalidArgument("out", "another buffer where all models share x", "the same buffer");

@@ -219,8 +219,7 @@ std::uint64_t lanes_of(const MediumScene& scene, std::uint32_t rows) {
 cl_event exact(const MediumScene& scene, Rows rows, View out, bool shaded, std::span<const cl_event> wait_list) {
     const auto& s = scene.state();
     rows = checked(rows, s.frame);
-    check_output(out, sizeof(float));
-    check_view("out", out, scene.values(rows));
+    check_output(shaded ? "mu" : "tau", out, scene.values(rows));
     return Launch(s.engine, "medium", "clr_medium_exact", options_of({}, Generator::philox))
         .view(out)
         .arg(s.device)
@@ -240,8 +239,7 @@ cl_event draw(const MediumScene& scene, const Sampler& sampler, const Stream& st
     rows = checked(rows, s.frame);
     const std::uint64_t values = scene.values(rows) * std::max(1u, levels);
     for (const auto& [name, view] : {std::pair{"m", m}, {"t", t}}) {
-        check_view(name, view, values);
-        check_output(view, sizeof(float));
+        check_output(name, view, values);
     }
     check_apart("m", m, "t", t);
     return Launch(s.engine, "medium", "clr_medium_render", options_of(sampler, stream.generator))

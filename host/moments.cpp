@@ -283,6 +283,7 @@ void Moments::add(std::span<const HostBatch> batches) {
     auto& s = *state_;
     const OnDevice put = put_on_device(s.engine, s.values, s.options.nonfinite, batches);
     check_room(s.batches(), batches.size());
+    const Joined joined(s.last);
     wait(add_batches(s, put.batches, {}));
 }
 

@@ -1,3 +1,5 @@
+#include <unistd.h>
+
 #include <algorithm>
 #include <chrono>
 #include <set>
@@ -148,7 +150,9 @@ namespace {
 
 // PoCL compiles every kernel of a program again to give its binary, seconds in which no kernel starts: what is not begun in
 // time is left to the next process.
-void save_binaries(const Engine::State& s) {
+void save_binaries(Engine::State& s) {
+    const std::unique_lock lock(s.mutex, std::try_to_lock);
+    if (!lock) return;  // another thread still builds
     const auto end = std::chrono::steady_clock::now() + std::chrono::seconds{1};
     const auto folder = cache::folder();
     for (const auto& [name, built] : s.programs) {
@@ -159,7 +163,7 @@ void save_binaries(const Engine::State& s) {
     }
 }
 
-void save_quietly(const Engine::State& s) {
+void save_quietly(Engine::State& s) {
     try {
         save_binaries(s);
     } catch (...) {
@@ -167,10 +171,9 @@ void save_quietly(const Engine::State& s) {
     }
 }
 
-const std::thread::id main_thread = std::this_thread::get_id();
 enum class Exit { unknown, to_come, begun } program_exit = Exit::unknown;  // of the main thread
 
-bool on_main_thread() { return std::this_thread::get_id() == main_thread; }
+bool on_main_thread() { return gettid() == getpid(); }
 
 /// The main thread's: it goes when the program exits, before anything static, the driver's parts among them.
 struct Keeper {

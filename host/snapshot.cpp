@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
-#include <limits>
 #include <map>
 
 #include "clratio/fixed.hpp"
@@ -132,15 +131,19 @@ std::vector<std::string> plane_names(const Snapshot& snapshot) {
     return names;
 }
 
-void check_words(const Snapshot& s) {
+void check_size(const Snapshot& s, const Snapshot::Plane& plane) {
+    if (plane.words.size() != s.values)
+        throw InvalidArgument("snapshot plane " + plane.name, std::to_string(s.values) + " values",
+                              std::to_string(plane.words.size()));
+}
+
+void check_planes(const Snapshot& s) {
     const auto names = plane_names(s);
     if (s.planes.size() != names.size())
         throw InvalidArgument("snapshot", std::to_string(names.size()) + " planes", std::to_string(s.planes.size()));
     for (std::size_t i = 0; i < names.size(); ++i) {
         if (s.planes[i].name != names[i]) throw InvalidArgument("snapshot", "plane " + names[i], s.planes[i].name);
-        if (s.planes[i].words.size() != s.values)
-            throw InvalidArgument("snapshot plane " + names[i], std::to_string(s.values) + " values",
-                                  std::to_string(s.planes[i].words.size()));
+        check_size(s, s.planes[i]);
     }
 }
 
@@ -205,7 +208,7 @@ Moments::Moments(const Engine& engine, const Snapshot& snapshot)
     if (snapshot.groups.size() != s.groups.size())
         throw InvalidArgument("snapshot", std::to_string(s.groups.size()) + " groups",
                               std::to_string(snapshot.groups.size()));
-    check_words(snapshot);
+    check_planes(snapshot);
     check_room(0, snapshot.batches());
     std::transform(snapshot.groups.begin(), snapshot.groups.end(), s.groups.begin(), group_of);
     auto plane = snapshot.planes.begin();
@@ -222,6 +225,7 @@ Snapshot slice(const Snapshot& snapshot, std::uint64_t begin, std::uint64_t coun
                               std::to_string(begin) + " to " + std::to_string(begin + count));
     Snapshot out{snapshot.kind, count, snapshot.settings, snapshot.groups, 0, 0, {}};
     for (const auto& plane : snapshot.planes) {
+        check_size(snapshot, plane);
         const auto first = plane.words.begin() + static_cast<std::ptrdiff_t>(begin);
         out.planes.push_back({plane.name, {first, first + static_cast<std::ptrdiff_t>(count)}});
     }
@@ -236,11 +240,13 @@ void append(Snapshot& to, const Snapshot& more) {
     check_alike("append", to, more);
     if (to.groups != more.groups) throw InvalidArgument("append", "the same batches", "others");
     if (to.planes.size() != more.planes.size()) throw InvalidArgument("append", "the same planes", "others");
-    for (std::size_t i = 0; i < to.planes.size(); ++i) {
-        const auto& words = more.planes[i].words;
+    for (std::size_t i = 0; i < to.planes.size(); ++i)
         if (to.planes[i].name != more.planes[i].name)
             throw InvalidArgument("append", "plane " + to.planes[i].name, more.planes[i].name);
-        to.planes[i].words.insert(to.planes[i].words.end(), words.begin(), words.end());
+    for (std::size_t i = 0; i < to.planes.size(); ++i) {
+        auto& words = to.planes[i].words;
+        words.reserve(words.size() + more.planes[i].words.size());  // so that `more` may be `to`
+        std::copy_n(more.planes[i].words.begin(), more.planes[i].words.size(), std::back_inserter(words));
     }
     to.values += more.values;
     to.negatives += more.negatives;
@@ -272,13 +278,8 @@ void merge(const Engine& engine, Snapshot& into, const Snapshot& more) {
     if (into.values != more.values)
         throw InvalidArgument("merge", std::to_string(into.values) + " values", std::to_string(more.values));
     check_alike("merge", into, more);
-    if (into.kind == "fixed") {
-        merge_planes<FixedMoments>(engine, into, more);
-    } else {
-        check_words(into);
-        check_words(more);
-        merge_planes<Moments>(engine, into, more);
-    }
+    if (into.values == 0) throw InvalidArgument("merge", "at least 1 value", "0");
+    into.kind == "fixed" ? merge_planes<FixedMoments>(engine, into, more) : merge_planes<Moments>(engine, into, more);
     into.negatives += more.negatives;
     into.skipped += more.skipped;
 }

@@ -294,7 +294,7 @@ void verify(const fs::path& path, const StateFile& state, std::uint64_t wanted) 
 }
 
 void write(const fs::path& path, const StateFile& state) {
-    FileOutput stream(output_target(path));
+    ExrStream stream(output_target(path));
     Imf::Header header = header_of(state);
     Checksum sum = checksum_of(header);
     const Rows rows = rows_of(state);
@@ -305,10 +305,10 @@ void write(const fs::path& path, const StateFile& state) {
         file.setFrameBuffer(frame_of(state, rows, box_of(state.shape.data_window)));
         file.writePixels(state.shape.height());
     }
-    stream.begin_sync();
-    verify(stream.path(), state, sum.sum());
-    stream.close_synced();
-    stream.rename_to_target();
+    stream.file().begin_sync();
+    verify(stream.file().path(), state, sum.sum());
+    stream.file().close_synced();
+    stream.file().rename_to_target();
 }
 
 // ---- reading

@@ -18,23 +18,6 @@ void check_range(std::uint64_t first, std::uint64_t count) {
         throw InvalidArgument("range", "an end of at most 2^60", std::to_string(first) + " + " + std::to_string(count));
 }
 
-void check_elements(const View& view, std::size_t element_bytes, const char* name) {
-    if (!view.mem) throw InvalidArgument(name, "a view of a buffer", "null");
-    if (view.channels == 0) throw InvalidArgument(name, "at least 1 channel", "0");
-    std::size_t bytes = 0;
-    check(clGetMemObjectInfo(view.mem, CL_MEM_SIZE, sizeof bytes, &bytes, nullptr), "clGetMemObjectInfo");
-    if (view.end() > bytes / element_bytes)
-        throw InvalidArgument(name, "a view inside its buffer of " + std::to_string(bytes) + " bytes",
-                              std::to_string(view.end()) + " elements of " + std::to_string(element_bytes) + " bytes");
-}
-
-void check_output(const View& out, std::size_t element_bytes) {
-    if (out.stride < out.channels)
-        throw InvalidArgument("out", "channels <= stride",
-                              "channels " + std::to_string(out.channels) + ", stride " + std::to_string(out.stride));
-    check_elements(out, element_bytes, "out");
-}
-
 void require_fp64(const Engine& engine, const char* what) {
     if (!engine.info().fp64) throw InvalidArgument(what, "a device with fp64", engine.info().name);
 }
@@ -55,7 +38,7 @@ cl_event fill(const Engine& engine, const char* kernel, std::uint64_t per_block,
               const Stream& stream, std::uint64_t first, View out, std::span<const cl_event> wait_list) {
     const auto device = device_stream(stream);
     check_range(first, out.count);
-    check_output(out, element_bytes);
+    check_output("out", out, out.count, element_bytes);
     if (element_bytes == sizeof(double)) require_fp64(engine, "double draws");
     const auto blocks = blocks_of(first, std::max<std::uint64_t>(1, out.count), per_block, engine.width());
     return Launch(engine, "stream", kernel, generator_option(stream.generator))

@@ -14,6 +14,7 @@
 #include "engine_state.hpp"
 #include "launch.hpp"
 #include "support/raw_kernel.hpp"
+#include "support/refused.hpp"
 #include "support/scratch.hpp"
 #include "support/shapes.hpp"
 
@@ -84,6 +85,7 @@ TEST(Engine, misuse_is_refused) {
     EXPECT_THROW(Engine(cl_command_queue{}), InvalidArgument);
     EXPECT_THROW(Engine({.width = 3}), InvalidArgument);
     EXPECT_THROW(Engine({.width = -1}), InvalidArgument);
+    refused([] { Engine({.path = EngineOptions::Path::groups, .work_items = 1u << 30}); }, "work_items: expected at most ");
     const Engine engine;
     EXPECT_THROW(Buffer(engine, engine.info().largest_allocation + 1), InvalidArgument);
 }

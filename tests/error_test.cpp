@@ -11,6 +11,7 @@
 #include "embedded.hpp"
 #include "support/oclgrind.hpp"
 #include "support/raw_kernel.hpp"
+#include "support/refused.hpp"
 #include "support/shapes.hpp"
 
 using namespace clratio;
@@ -65,15 +66,6 @@ bool is_equation_14(const ErrorModel& e, const Stream& stream, const std::vector
         if (!(std::abs(static_cast<double>(got[i]) - want) <= (6e-7 + 5 * 0x1p-24) * scale)) return false;
     }
     return true;
-}
-
-template <class Call> void refused(const char* name, Call call) {
-    try {
-        call();
-        ADD_FAILURE() << name << " was accepted";
-    } catch (const InvalidArgument& e) {
-        EXPECT_NE(std::string(e.what()).find(name), std::string::npos) << e.what();
-    }
 }
 
 const std::vector<std::uint64_t> starts{0, 1, 33, (1ull << 32) - 501, (1ull << 33) - 700, end_of_stream - 1003};
@@ -185,12 +177,16 @@ TEST(Error, bad_parameters_are_refused_by_name) {
     const Engine engine;
     std::vector<float> out(4);
     const double nan = std::numeric_limits<double>::quiet_NaN();
-    refused("sigma_m", [] { canonical({.sigma_m = -1}); });
-    refused("sigma_t", [=] { canonical({.sigma_t = nan}); });
-    refused("rho", [] { canonical({.sigma_m = 1, .rho = 1.5}); });
-    refused("n", [] { canonical({.n = 0}); });
-    refused("s", [&] { error_samples(engine, Canonical{-1, 0, 1}, {1}, 0, out); });
-    refused("a", [&] { error_samples(engine, Canonical{1, nan, 1}, {1}, 0, out); });
-    refused("range", [&] { error_samples(engine, Canonical{1, 0, 1}, {1}, end_of_stream - 2, out); });
-    refused("seed", [&] { error_samples(engine, Canonical{1, 0, 1}, {1ull << 40, 0, Generator::pcg4d3x}, 0, out); });
+    refused([] { canonical({.sigma_m = -1}); }, "sigma_m: expected");
+    refused([=] { canonical({.sigma_t = nan}); }, "sigma_t: expected");
+    refused([] { canonical({.sigma_m = 1, .rho = 1.5}); }, "rho: expected");
+    refused([] { canonical({.n = 0}); }, "n: expected");
+    refused([&] { error_samples(engine, Canonical{-1, 0, 1}, {1}, 0, out); }, "s: expected");
+    refused([&] { error_samples(engine, Canonical{1, nan, 1}, {1}, 0, out); }, "a: expected");
+    refused([&] { error_samples(engine, Canonical{1, 0, 1}, {1}, end_of_stream - 2, out); }, "range: expected");
+    refused(
+        [&] {
+            error_samples(engine, Canonical{1, 0, 1}, {1ull << 40, 0, Generator::pcg4d3x}, 0, out);
+        },
+        "seed: expected");
 }

@@ -9,6 +9,7 @@
 #include "embedded.hpp"
 #include "support/oclgrind.hpp"
 #include "support/raw_kernel.hpp"
+#include "support/refused.hpp"
 #include "support/shapes.hpp"
 
 using namespace clratio;
@@ -66,15 +67,6 @@ std::vector<float> edge_values(const Bins& b) {
         for (const float x : {std::nextafter(edge, -infinity), edge, std::nextafter(edge, infinity)}) v.push_back(x);
     }
     return v;
-}
-
-template <class Call> void refused(const char* name, Call call) {
-    try {
-        call();
-        ADD_FAILURE() << name << " was accepted";
-    } catch (const InvalidArgument& e) {
-        EXPECT_NE(std::string(e.what()).find(name), std::string::npos) << e.what();
-    }
 }
 
 std::uint64_t peak_memory_kb() {
@@ -161,12 +153,16 @@ TEST(Histogram, parts_that_do_not_belong_are_refused) {
     };
     auto sum = part(wide, {1}, {0, 100}, bins);
     const auto before = row_of(sum);
-    refused("twice", [&] { sum += part(wide, {1}, {99, 5}, bins); });
-    refused("law", [&] { sum += part(impulse, {1}, {100, 5}, bins); });
-    refused("stream", [&] { sum += part(wide, {2}, {100, 5}, bins); });
-    refused("bins", [&] { sum += part(wide, {1}, {100, 5}, {-1.5, 1.5, 1000}); });
-    refused("bins", [&] { sum += part(wide, {1}, {100, 5}, {-1.5, 2, 1024}); });
-    refused("precision", [&] { sum += part(wide, {1}, {100, 5}, bins, Precision::double_precision); });
+    refused([&] { sum += part(wide, {1}, {99, 5}, bins); }, "twice");
+    refused([&] { sum += part(impulse, {1}, {100, 5}, bins); }, "histogram: expected the same law");
+    refused([&] { sum += part(wide, {2}, {100, 5}, bins); }, "histogram: expected the same stream");
+    refused([&] { sum += part(wide, {1}, {100, 5}, {-1.5, 1.5, 1000}); }, "histogram: expected the same bins");
+    refused([&] { sum += part(wide, {1}, {100, 5}, {-1.5, 2, 1024}); }, "histogram: expected the same bins");
+    refused(
+        [&] {
+            sum += part(wide, {1}, {100, 5}, bins, Precision::double_precision);
+        },
+        "histogram: expected the same precision");
     EXPECT_EQ(row_of(sum), before);
     EXPECT_EQ(sum.ranges, (std::vector<IndexRange>{{0, 100}}));
 }
@@ -254,18 +250,26 @@ TEST(Histogram, bad_parameters_are_refused_by_name) {
     const auto call = [&](IndexRange range, Bins b, Stream stream = {1}) {
         error_histogram(engine, wide, stream, range, b);
     };
-    refused("range", [&] { call({0, 0}, bins); });
-    refused("range", [&] { call({end_of_stream - 1, 2}, bins); });
-    refused("bins", [&] { call({0, 1}, {1, 1, 10}); });
-    refused("bins", [&] { call({0, 1}, {0, std::nan(""), 10}); });
-    refused("bins", [&] { call({0, 1}, {-3e38, 3e38, 10}); });
-    refused("bins", [&] { call({0, 1}, {0, 1, 0}); });
-    refused("bins", [&] { call({0, 1}, {0, 1, (1u << 23) + 1}); });
-    refused("bins", [&] { error_histograms(engine, std::vector<Canonical>(100000, wide), {1}, {0, 1}, {0, 1, 1u << 23}); });
-    refused("stream.id", [&] { error_histograms(engine, std::vector<Canonical>(2, wide), {1, ~0u}, {0, 1}, bins); });
-    refused("laws", [&] { error_histograms(engine, {}, {1}, {0, 1}, bins); });
+    refused([&] { call({0, 0}, bins); }, "range: expected");
+    refused([&] { call({end_of_stream - 1, 2}, bins); }, "range: expected");
+    refused([&] { call({0, 1}, {1, 1, 10}); }, "bins: expected");
+    refused([&] { call({0, 1}, {0, std::nan(""), 10}); }, "bins: expected");
+    refused([&] { call({0, 1}, {-3e38, 3e38, 10}); }, "bins: expected");
+    refused([&] { call({0, 1}, {0, 1, 0}); }, "bins: expected");
+    refused([&] { call({0, 1}, {0, 1, (1u << 23) + 1}); }, "bins: expected");
+    refused(
+        [&] {
+            error_histograms(engine, std::vector<Canonical>(100000, wide), {1}, {0, 1}, {0, 1, 1u << 23});
+        },
+        "bins: expected");
+    refused(
+        [&] {
+            error_histograms(engine, std::vector<Canonical>(2, wide), {1, ~0u}, {0, 1}, bins);
+        },
+        "stream.id: expected");
+    refused([&] { error_histograms(engine, {}, {1}, {0, 1}, bins); }, "laws: expected");
     Row rows(3);
-    refused("rows", [&] { add_error_counts(engine, {&wide, 1}, {1}, {0, 1}, bins, rows); });
+    refused([&] { add_error_counts(engine, {&wide, 1}, {1}, {0, 1}, bins, rows); }, "rows: expected");
 }
 
 // Faults planted into the device's source, each to be seen in the counts.

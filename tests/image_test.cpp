@@ -435,13 +435,13 @@ TEST(Image, a_full_disk_is_an_error_and_leaves_the_old_file) {
 TEST(Image, a_failed_write_that_was_swallowed_is_thrown_at_close) {
     const clratio::test::Scratch scratch;
     const auto write = [&](std::size_t bytes) {
-        FileOutput out(scratch / "a.exr");
+        ExrStream out(scratch / "a.exr");
         try {
             out.write(std::string(bytes, 'x').c_str(), static_cast<int>(bytes));
         } catch (const std::exception&) {
         }
         try {
-            out.close_synced();
+            out.file().close_synced();
         } catch (const std::exception& e) {
             throw IoError("a.exr", "", e.what());
         }

@@ -53,6 +53,22 @@ TEST(OutputTool, a_full_disk_exits_1_and_keeps_the_old_file) {
     EXPECT_EQ(scratch.files(), 1u);
 }
 
+TEST(OutputTool, pictures_keep_the_mode_of_what_they_replace_and_remove_what_killed_ones_left) {
+    const Scratch scratch;
+    const std::string out = scratch / "o.png";
+    const Words words{"picture", files("area", "m", 1)[0], "-o", out};
+    ASSERT_EQ(clratio_tool(words).code, 0);
+    constexpr auto mine = std::filesystem::perms::owner_read | std::filesystem::perms::owner_write;
+    std::filesystem::permissions(out, mine);
+    put_bytes(scratch / ".o.png.1234-0.tmp", "half of one");
+    put_bytes(scratch / ".other.png.1234-0.tmp", "another's");
+    ASSERT_EQ(clratio_tool(words).code, 0);
+    EXPECT_EQ(std::filesystem::status(out).permissions(), mine);
+    EXPECT_EQ(scratch.files(), 2u);
+    expect_refused(words, 1, out + ": cannot be written: File too large", {.file_size_limit = 100});
+    EXPECT_EQ(scratch.files(), 2u);
+}
+
 TEST(OutputTool, a_full_standard_output_exits_1) {
     const Said said = clratio_tool({"compare", reference("area", "m"), reference("area", "m")}, {.out = "/dev/full"});
     EXPECT_EQ(said.code, 1);

@@ -3,6 +3,8 @@
 #   install        the build, into BINARY/package/prefix
 #   plain          tests/package: found with find_package, built, its own tests run
 #   native         the same with -march=native -O3
+#   core           tests/package/core: the library where there is no OpenEXR
+#   shared         tests/package with shared libraries, compiled in a hurry and installed
 #   pkg_config     readme.cpp, compiled by hand with what pkg-config says
 #   subdirectory   tests/package/subdirectory, which takes the whole of clratio in, compiled in a hurry
 #   readme         every C++ text of README.md stands in a program of tests/package
@@ -13,13 +15,17 @@ function(run)
   execute_process(COMMAND ${ARGN} COMMAND_ERROR_IS_FATAL ANY)
 endfunction()
 
+# configure FOLDER BUILD OPTION...
+function(configure folder build)
+  run(${CMAKE_COMMAND} -S ${folder} -B ${build} -G ${GENERATOR} -DCMAKE_BUILD_TYPE=Release
+    -DCMAKE_CXX_COMPILER=${COMPILER} -DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER} ${ARGN})
+endfunction()
+
 # build_and_test FOLDER NAME OPTION...
 function(build_and_test folder name)
   set(build ${package}/${name})
   file(REMOVE_RECURSE ${build})
-  run(${CMAKE_COMMAND} -S ${folder} -B ${build} -G ${GENERATOR} -DCMAKE_BUILD_TYPE=Release
-    -DCMAKE_CXX_COMPILER=${COMPILER} -DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER} -DCLRATIO_TEST_DATA=${SOURCE}/tests/data
-    ${ARGN})
+  configure(${folder} ${build} -DCLRATIO_TEST_DATA=${SOURCE}/tests/data ${ARGN})
   run(${CMAKE_COMMAND} --build ${build})
   run(${CMAKE_CTEST_COMMAND} --test-dir ${build} --output-on-failure --no-tests=error)
 endfunction()
@@ -43,6 +49,16 @@ elseif(STEP STREQUAL plain)
   build_and_test(${SOURCE}/tests/package plain -DCMAKE_PREFIX_PATH=${prefix})
 elseif(STEP STREQUAL native)
   build_and_test(${SOURCE}/tests/package native -DCMAKE_PREFIX_PATH=${prefix} "-DCMAKE_CXX_FLAGS=-march=native -O3")
+elseif(STEP STREQUAL core)
+  build_and_test(${SOURCE}/tests/package/core core -DCMAKE_PREFIX_PATH=${prefix})
+elseif(STEP STREQUAL shared)
+  set(build ${package}/shared_build)
+  file(REMOVE_RECURSE ${build} ${package}/shared_prefix)
+  configure(${SOURCE} ${build} -DBUILD_SHARED_LIBS=ON -DCMAKE_CXX_FLAGS_RELEASE=-O0 -DCLRATIO_TOOL=OFF -DCLRATIO_TESTS=OFF
+    -DCLRATIO_BENCH=OFF)
+  run(${CMAKE_COMMAND} --build ${build})
+  run(${CMAKE_COMMAND} --install ${build} --prefix ${package}/shared_prefix)
+  build_and_test(${SOURCE}/tests/package shared -DCMAKE_PREFIX_PATH=${package}/shared_prefix)
 elseif(STEP STREQUAL pkg_config)
   file(GLOB_RECURSE files ${prefix}/clratio.pc ${prefix}/*/clratio.pc)
   list(GET files 0 file)

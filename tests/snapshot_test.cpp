@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "clratio/combine.hpp"
+#include "clratio/fixed.hpp"
 #include "support/refused.hpp"
 #include "support/samples.hpp"
 
@@ -164,15 +165,33 @@ TEST(Snapshot, misfits_are_refused_by_name) {
     refuse([](auto& s) { s.groups[0].weight = std::numeric_limits<double>::quiet_NaN(); }, "weight");
     refuse([](auto& s) { s.groups[0].batches = 0; }, "weight");
     refuse([](auto& s) { s.groups[0].batches = std::uint64_t{1} << 32; }, "2^32 - 1");
-    const auto refuse_merge = [&](auto change, const std::string& what) {
-        Snapshot other = good;
+    const auto refuse_with = [&](const Snapshot& right, auto change, const std::string& what) {
+        Snapshot other = right;
         change(other);
-        Snapshot into = good;
+        Snapshot into = right;
         refused([&] { merge(engine, into, other); }, what);
-        EXPECT_EQ(into, good);
+        EXPECT_EQ(into, right);
     };
+    const auto refuse_merge = [&](auto change, const std::string& what) { refuse_with(good, change, what); };
     refuse_merge([](auto& s) { s.values = 7; }, "merge: expected 1003 values, got 7");
     refuse_merge([](auto& s) { s.kind = "fixed"; }, "merge: expected a state of kind moments, got fixed");
     refuse_merge([](auto& s) { s.settings[0].second = "propagate"; },
                  "merge: expected settings nonfinite=skip ratios=0 groups=1 weights=samples, got nonfinite=propagate");
+    FixedMoments whole_numbers(engine, 3);
+    whole_numbers.add(std::vector<float>{1, 2, 3}, std::vector<float>{4, 5, 6});
+    const Snapshot fixed = whole_numbers.snapshot();
+    const auto shorten = [](auto& s) { s.planes.back().words.pop_back(); };
+    refuse_merge(shorten, "snapshot plane batches: expected 1003 values, got 1002");
+    refuse_with(fixed, shorten, "snapshot plane batches: expected 3 values, got 2");
+    refuse_with(
+        fixed, [](auto& s) { s.planes[0].name = "x"; }, "plane m.0, got x");
+    refuse_with(
+        slice(fixed, 0, 0), [](auto&) {}, "merge: expected at least 1 value, got 0");
+    Snapshot twice = good, other = good;
+    other.planes.back().name = "x";
+    refused([&] { append(twice, other); }, "append: expected plane batches, got x");
+    EXPECT_EQ(twice, good);
+    append(twice, twice);
+    EXPECT_EQ(slice(twice, 0, values).planes, good.planes);
+    EXPECT_EQ(slice(twice, values, values).planes, good.planes);
 }

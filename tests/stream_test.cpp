@@ -10,9 +10,11 @@
 #include <sstream>
 
 #include "clratio/device/quantile.h"
+#include "clratio/histogram.hpp"
 #include "embedded.hpp"
 #include "support/oclgrind.hpp"
 #include "support/raw_kernel.hpp"
+#include "support/refused.hpp"
 #include "support/shapes.hpp"
 #include "support/theory.hpp"
 
@@ -375,23 +377,20 @@ TEST(Stream, fills_views_with_gaps_and_leaves_the_gaps_alone) {
 TEST(Stream, bad_arguments_are_refused_by_name) {
     const Engine engine;
     std::vector<float> out(4);
-    const auto refused = [](const char* name, auto call) {
-        try {
-            call();
-            ADD_FAILURE() << name << " was accepted";
-        } catch (const InvalidArgument& e) {
-            EXPECT_EQ(e.name, name) << e.what();
-        }
-    };
-    refused("seed", [&] { fill_normals(engine, {1ull << 32, 0, Generator::pcg4d3x}, 0, out); });
-    refused("domain", [&] { fill_normals(engine, {1, 0, Generator::philox, static_cast<Domain>(16)}, 0, out); });
-    refused("range", [&] { fill_normals(engine, {1}, end_of_stream - 3, out); });
-    refused("range", [&] { word({1}, end_of_stream); });
-    refused("out", [&] { fill_normals(engine, {1}, 0, View{}); });
+    refused([&] { fill_normals(engine, {1ull << 32, 0, Generator::pcg4d3x}, 0, out); }, "seed: expected");
+    refused([&] { fill_normals(engine, {1, 0, Generator::philox, static_cast<Domain>(16)}, 0, out); }, "domain: expected");
+    refused([&] { fill_normals(engine, {1}, end_of_stream - 3, out); }, "range: expected");
+    refused([&] { word({1}, end_of_stream); }, "range: expected");
+    refused([&] { fill_normals(engine, {1}, 0, View{}); }, "out: expected");
     const Buffer small(engine, 16);
-    refused("out", [&] { fill_normals(engine, {1}, 0, View{small.mem(), 1, 4}); });
-    refused("out", [&] { fill_normals_double(engine, {1}, 0, View{small.mem(), 0, 3}); });
-    refused("out", [&] { fill_normals(engine, {1}, 0, View{small.mem(), 0, 4, 0, 1}); });
+    refused([&] { fill_normals(engine, {1}, 0, View{small.mem(), 1, 4}); }, "out: expected");
+    refused([&] { fill_normals_double(engine, {1}, 0, View{small.mem(), 0, 3}); }, "out: expected");
+    refused([&] { fill_normals(engine, {1}, 0, View{small.mem(), 0, 4, 0, 1}); }, "out: expected a stride");
+    const View wraps{small.mem(), ~std::uint64_t{0} - 3, 8}, endless{small.mem(), 0, ~std::uint64_t{0} / 4 + 2, 4, 1};
+    refused([&] { fill_normals(engine, {1}, 0, wraps); }, "out: expected a view inside its buffer of 4 elements");
+    refused([&] { histogram(engine, wraps, {-1, 1, 4}); }, "values: expected a view inside its buffer of 4 elements");
+    refused([&] { histogram(engine, endless, {-1, 1, 4}); }, "values: expected a view inside its buffer of 4 elements");
+    refused([&] { error_samples(engine, Canonical{1, 0, 1}, {1}, 0, wraps); }, "out: expected a view inside its buffer");
 }
 
 // Faults that the bit comparisons above must catch, each planted into the device's source.

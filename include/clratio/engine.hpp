@@ -50,7 +50,7 @@ struct EngineOptions {
     Require require = Require::nothing;
     int width = 0;                 ///< lanes of a vector: 1, 2, 4, 8, 16
     Path path = Path::automatic;   ///< a range for each work-item (CPU), or work-groups that share (GPU)
-    std::uint32_t work_items = 0;  ///< ranges: how many; groups: the work-group size
+    std::uint32_t work_items = 0;  ///< ranges: how many; groups: the work-group size, which the device limits
     bool disk_cache = true;        ///< keep built programs in $XDG_CACHE_HOME/clratio
 };
 
@@ -61,16 +61,17 @@ public:
     /// Picks a device: CLRATIO_DEVICE ("0:0", "cpu", "gpu", or a part of a name), then a GPU, then a CPU.
     /// Errors: DeviceError without a platform or device (names the package to install), InvalidArgument.
     explicit Engine(EngineOptions options = {});
-    /// Wraps the caller's queue, in order or out of order; it is retained.
+    /// Wraps the caller's queue, in order or out of order; it is retained. info().id is empty then. Errors: InvalidArgument
+    /// for a null queue and for options, DeviceError.
     explicit Engine(cl_command_queue queue, EngineOptions options = {});
 
     const DeviceInfo& info() const;
     cl_command_queue queue() const;
     cl_context context() const;
     cl_device_id device() const;
-    int width() const;     ///< lanes
-    bool grouped() const;  ///< true where work-groups share (GPU path)
-    std::uint32_t work_items() const;
+    int width() const;                 ///< lanes
+    bool grouped() const;              ///< true where work-groups share (GPU path)
+    std::uint32_t work_items() const;  ///< as in EngineOptions, with the library's choice made
 
     /// Whether + - * / sqrt fma of 64 triples of normal floats have the host's bits on the device. Blocking. Errors:
     /// DeviceError, BuildError. Cost: one small launch, the first time a kernel to build or to load from the disk cache.

@@ -23,8 +23,12 @@ struct FixedOptions {
     /// The largest magnitude is 2^range, itself allowed: 0 to 48. 16 holds every finite float16.
     int range = 16;
 
-    /// The largest sum of weights, 2^(63 - resolution - range) - 1: up to it, no sum of values within range can overflow.
-    std::uint64_t most_weight() const { return (std::uint64_t{1} << (63 - resolution - range)) - 1; }
+    /// The largest sum of weights, 2^(63 - resolution - range) - 1: up to it, no sum of values within range can overflow. 0
+    /// for options that no state can have.
+    std::uint64_t most_weight() const {
+        const int bits = 63 - resolution - range;
+        return bits > 0 && bits < 64 ? (std::uint64_t{1} << bits) - 1 : 0;
+    }
 };
 
 /// The options of a FixedMoments that the snapshot was taken of. Errors: InvalidArgument for another kind, a setting that is

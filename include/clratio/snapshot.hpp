@@ -14,9 +14,9 @@ struct MomentsOptions;
 
 /// What a state holds, bit for bit: from Moments::snapshot() and back by Moments(engine, snapshot).
 ///
-/// Shapes: each plane holds `values` words for each group; the planes of groups after the first are called "g1.m.hi" and
-/// so on, group by group. Words are float32 bits in planes whose name ends in .hi or .lo, unsigned integers in all others.
-/// NaN: kept with its bits. Units: as the state's planes, see StatePlanes.
+/// Shapes: each plane holds `values` words. Every group has planes of its own, those of groups after the first called
+/// "g1.m.hi" and so on, group by group. Words are float32 bits in planes whose name ends in .hi or .lo, unsigned integers in
+/// all others. NaN: kept with its bits. Units: as the state's planes, see StatePlanes.
 struct Snapshot {
     std::string kind;                                           ///< "moments" for Moments, "fixed" for FixedMoments
     std::uint64_t values = 0;                                   ///< pixels x channels
@@ -48,7 +48,7 @@ struct Snapshot {
 MomentsOptions moments_options(const Snapshot& snapshot);
 
 /// Values [begin, begin + count) of a snapshot, with none of its negatives and skipped: a state of its own.
-/// Errors: InvalidArgument for a range past the end. Each plane must hold `values` words, which is not checked.
+/// Errors: InvalidArgument for a range past the end, or a plane that does not hold `values` words.
 Snapshot slice(const Snapshot& snapshot, std::uint64_t begin, std::uint64_t count);
 /// The reverse: more values after those that are there, their negatives and skipped added. An empty one takes all of `more`.
 /// Errors: InvalidArgument where kind, settings, groups or planes differ.

@@ -1,10 +1,6 @@
 #include "output_file.hpp"
 
-#include <unistd.h>
-
-#include <cerrno>
-#include <cstring>
-#include <filesystem>
+#include <system_error>
 
 #include "clratio/state.hpp"
 #include "output_target.hpp"
@@ -19,36 +15,32 @@ namespace fs = std::filesystem;
     throw clratio::IoError(file, "", "cannot be written: " + reason);
 }
 
-std::string target_of(const std::string& file) {
-    require_place_for(file);
-    return clratio::output_target(file).string();
-}
-
-std::string part_of(const fs::path& target) {
-    return (target.parent_path() / (clratio::short_name(target) + "." + std::to_string(getpid()) + ".part")).string();
+template <class Work> auto named(const std::string& file, Work work) {
+    try {
+        return work();
+    } catch (const std::system_error& e) {
+        cannot_write(file, e.code().message());
+    }
 }
 
 }  // namespace
 
 OutputFile::OutputFile(std::string path)
-    : path_(std::move(path)), target_(target_of(path_)), part_(part_of(target_)), file_(std::fopen(part_.c_str(), "wb")) {
-    if (!file_) fail();
-}
-
-OutputFile::~OutputFile() {
-    if (file_) std::remove(part_.c_str());
-}
-
-void OutputFile::fail() const { cannot_write(path_, std::strerror(errno)); }
+    : path_(std::move(path)), file_(named(path_, [&] {
+          require_place_for(path_);
+          return clratio::WholeFile(clratio::output_target(path_));
+      })) {}
 
 void OutputFile::write(std::string_view bytes) {
-    if (std::fwrite(bytes.data(), 1, bytes.size(), file_.get()) != bytes.size()) fail();
+    named(path_, [&] { file_.write(bytes, size_); });
+    size_ += bytes.size();
 }
 
 void OutputFile::commit() {
-    if (std::fflush(file_.get()) != 0 || fsync(fileno(file_.get())) != 0) fail();
-    if (std::rename(part_.c_str(), target_.c_str()) != 0) fail();
-    file_.reset();
+    named(path_, [&] {
+        file_.close_synced();
+        file_.rename_to_target();
+    });
 }
 
 void require_place_for_state(const std::string& file) {

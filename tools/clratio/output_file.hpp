@@ -1,11 +1,12 @@
 // A file that appears whole or not at all.
 #pragma once
 
-#include <cstdio>
+#include <cstdint>
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <string_view>
+
+#include "whole_file.hpp"
 
 namespace tool {
 
@@ -14,21 +15,14 @@ namespace tool {
 class OutputFile {
 public:
     explicit OutputFile(std::string path);
-    ~OutputFile();
-    OutputFile(const OutputFile&) = delete;
-    OutputFile& operator=(const OutputFile&) = delete;
 
     void write(std::string_view bytes);
     void commit();
 
 private:
-    struct Close {
-        void operator()(std::FILE* f) const { std::fclose(f); }
-    };
-    [[noreturn]] void fail() const;
-
-    std::string path_, target_, part_;
-    std::unique_ptr<std::FILE, Close> file_;
+    std::string path_;
+    clratio::WholeFile file_;
+    std::uint64_t size_ = 0;
 };
 
 /// Said before the work, not after it: an IoError that `file` has no folder, or that what stands there is no file; a

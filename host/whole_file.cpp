@@ -1,4 +1,4 @@
-#include "exr_stream.hpp"
+#include "whole_file.hpp"
 
 #include <fcntl.h>
 #include <sys/file.h>
@@ -69,7 +69,7 @@ void sync_folder(const fs::path& folder) {
 
 }  // namespace
 
-FileOutput::FileOutput(const fs::path& target) : Imf::OStream(target.c_str()), target_(target) {
+WholeFile::WholeFile(const fs::path& target) : target_(target) {
     remove_left_behind(target);
     do {
         if (file_ >= 0) close(file_);
@@ -82,19 +82,19 @@ FileOutput::FileOutput(const fs::path& target) : Imf::OStream(target.c_str()), t
     lock_ = fcntl(file_, F_DUPFD_CLOEXEC, 0);
 }
 
-FileOutput::~FileOutput() {
+WholeFile::~WholeFile() {
     if (synced_.valid()) synced_.wait();
     if (file_ >= 0) close(file_);
     if (exists_) unlink(temporary_.c_str());
     if (lock_ >= 0) close(lock_);
 }
 
-void FileOutput::fail(int code) {
+void WholeFile::fail(int code) {
     if (failure_ == 0) failure_ = code;
     throw std::system_error(failure_, std::system_category());
 }
 
-void FileOutput::put(std::span<const char> bytes, std::uint64_t position) {
+void WholeFile::put(std::span<const char> bytes, std::uint64_t position) {
     while (!bytes.empty()) {
         const ssize_t done = pwrite(file_, bytes.data(), bytes.size(), static_cast<off_t>(position));
         if (done < 0 && errno == EINTR) continue;
@@ -104,38 +104,36 @@ void FileOutput::put(std::span<const char> bytes, std::uint64_t position) {
     }
 }
 
-void FileOutput::flush() {
+void WholeFile::flush() {
     put(gathered_, gathered_at_);
     gathered_.clear();
 }
 
-void FileOutput::write(const char bytes[], int size) {
+void WholeFile::write(std::span<const char> bytes, std::uint64_t position) {
     constexpr std::size_t most = 1 << 16;
     if (failure_ != 0) fail(failure_);
-    const std::span<const char> more(bytes, static_cast<std::size_t>(std::max(size, 0)));
-    if (position_ != gathered_at_ + gathered_.size() || gathered_.size() + more.size() > most) flush();
-    if (gathered_.empty()) gathered_at_ = position_;
-    if (more.size() > most)
-        put(more, position_);
+    if (position != gathered_at_ + gathered_.size() || gathered_.size() + bytes.size() > most) flush();
+    if (gathered_.empty()) gathered_at_ = position;
+    if (bytes.size() > most)
+        put(bytes, position);
     else
-        gathered_.insert(gathered_.end(), more.begin(), more.end());
-    position_ += more.size();
+        gathered_.insert(gathered_.end(), bytes.begin(), bytes.end());
 }
 
-void FileOutput::begin_sync() {
+void WholeFile::begin_sync() {
     if (failure_ != 0) fail(failure_);
     flush();
     synced_ = std::async(std::launch::async, [file = file_] { return fsync(file) == 0 ? 0 : errno; });
 }
 
-void FileOutput::close_synced() {
+void WholeFile::close_synced() {
     if (!synced_.valid()) begin_sync();
     failure_ = synced_.get();
     if (close(std::exchange(file_, -1)) != 0 && failure_ == 0) failure_ = errno;
     if (failure_ != 0) fail(failure_);
 }
 
-void FileOutput::rename_to_target() {
+void WholeFile::rename_to_target() {
     if (rename(temporary_.c_str(), target_.c_str()) != 0) fail(errno);
     exists_ = false;
     sync_folder(target_.parent_path());
