@@ -1,12 +1,15 @@
 // combine_batches: batches that are all there are, combined in one pass.
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cmath>
 #include <limits>
+#include <thread>
 
 #include "clratio/combine.hpp"
 #include "engine_state.hpp"
 #include "launch.hpp"
+#include "moments_state.hpp"
 #include "support/oclgrind.hpp"
 #include "support/refused.hpp"
 #include "support/samples.hpp"
@@ -155,6 +158,28 @@ TEST(Batches, the_estimate_may_take_the_place_of_tau) {
     sum.add(in.batches());
     const auto read_out = [&](const Tau& tau, Combined place) { return combine(sum, tau, {}, std::move(place)); };
     EXPECT_EQ(over(in.tau, read_out), bits(combine(sum, in.control())));
+}
+
+// The first launch waits at a gate; the read-out after it cannot be built. The caller's memory is his again when he hears of it.
+TEST(Batches, an_error_between_two_launches_comes_after_the_first_has_ended) {
+    const Engine engine({.disk_cache = false});
+    Moments sum(engine, values);
+    const Input in(1);
+    sum.add(in.batches());
+    engine.state().wide = 5;  // no vector has so many lanes
+    const cl_event gate = clCreateUserEvent(engine.context(), nullptr);
+    sum.state().last = Event::share(gate);
+    std::jthread opens([&] {
+        std::this_thread::sleep_for(std::chrono::seconds(1));
+        clSetUserEventStatus(gate, CL_COMPLETE);
+    });
+    EXPECT_THROW(add_and_combine(sum, in.batches(), in.control(), {.estimator = Estimator::beale}), BuildError);
+    cl_int status = CL_QUEUED;
+    clGetEventInfo(sum.state().last.get(), CL_EVENT_COMMAND_EXECUTION_STATUS, sizeof status, &status, nullptr);
+    EXPECT_EQ(status, CL_COMPLETE);
+    EXPECT_EQ(sum.batches(), 2u);
+    opens.join();
+    clReleaseEvent(gate);
 }
 
 TEST(Batches, views_may_have_gaps_and_the_result_may_stand_on_an_input) {
