@@ -27,7 +27,9 @@ std::uint64_t checked_total(std::span<const std::uint64_t> counts, std::span<con
         if (!(p >= 0)) throw InvalidArgument("probabilities", "none that is negative or NaN", std::to_string(p));
     const double sum = std::accumulate(probabilities.begin(), probabilities.end(), 0.0);
     if (!(std::abs(sum - 1) <= 1e-9)) throw InvalidArgument("probabilities", "a sum of 1", std::to_string(sum));
-    const auto n = std::accumulate(counts.begin(), counts.end(), std::uint64_t{0});
+    std::uint64_t n = 0;
+    for (const std::uint64_t count : counts)
+        if (__builtin_add_overflow(n, count, &n)) throw InvalidArgument("counts", "fewer than 2^64 draws", "more");
     if (n == 0) throw InvalidArgument("counts", "at least one draw", "none");
     return n;
 }
@@ -69,6 +71,7 @@ double kolmogorov_above(double x) {
 
 // P(A^2 <= z) of the limiting law, Anderson and Darling's series. Panels lie denser near 0, where the integrand bends.
 double anderson_darling_below(double z) {
+    if (z > 36) return 1;  // above lie 4e-17, and the series cancels
     constexpr int panels = 16;
     double sum = 0, binomial = 1;
     for (int j = 0; j < 400; ++j) {
@@ -99,6 +102,12 @@ Fit with_nan_rejected(Fit fit, const Histogram& h) {
     return fit;
 }
 
+void check_sums(std::span<const double> cdf, std::span<const double> sf) {
+    for (std::size_t i = 0; i < cdf.size(); ++i)
+        if (std::abs(cdf[i] + sf[i] - 1) > 1e-3)
+            throw InvalidArgument("sf", "1 - cdf", std::to_string(sf[i]) + " beside a cdf of " + std::to_string(cdf[i]));
+}
+
 void check_unit(const char* name, std::span<const double> values) {
     for (double v : values)
         if (!(v >= 0 && v <= 1)) throw InvalidArgument(name, "values in [0, 1]", std::to_string(v));
@@ -107,6 +116,7 @@ void check_unit(const char* name, std::span<const double> values) {
 }  // namespace
 
 Fit chi_square(std::span<const std::uint64_t> counts, std::span<const double> probabilities, double least_expected) {
+    if (!(least_expected > 0)) throw InvalidArgument("least_expected", "a number above 0", std::to_string(least_expected));
     const std::uint64_t n = checked_total(counts, probabilities);
     const auto cells = pooled(counts, probabilities, static_cast<double>(n), least_expected);
     if (cells.size() < 2)
@@ -162,6 +172,7 @@ Fit anderson_darling(std::span<const double> cdf, std::span<const double> sf) {
                               std::to_string(sf.size()));
     check_unit("cdf", cdf);
     check_unit("sf", sf);
+    check_sums(cdf, sf);
     std::vector<double> below(cdf.begin(), cdf.end()), above(sf.begin(), sf.end());
     std::sort(below.begin(), below.end());
     std::sort(above.begin(), above.end());

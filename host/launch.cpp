@@ -65,9 +65,7 @@ Buffer::Buffer(const Engine& engine, std::size_t bytes)
     : queue_(engine.state().queue), memory_(allocate_own(engine, bytes)), size_(bytes) {}
 
 Buffer Buffer::zeroed(const Engine& engine, std::size_t bytes) {
-    Buffer b(engine, bytes);
-    b.write(std::vector<std::byte>(bytes));
-    return b;
+    return copy_of(engine, std::vector<std::byte>(bytes), CL_MEM_READ_WRITE);
 }
 
 Buffer Buffer::from_host(const Engine& engine, std::span<const std::byte> bytes, cl_mem_flags access) {
@@ -80,10 +78,10 @@ Buffer Buffer::from_host(const Engine& engine, std::span<const std::byte> bytes,
     return b;
 }
 
-Buffer Buffer::copy_of(const Engine& engine, std::span<const std::byte> bytes) {
+Buffer Buffer::copy_of(const Engine& engine, std::span<const std::byte> bytes, cl_mem_flags access) {
     Buffer b;
     b.queue_ = engine.state().queue;
-    b.memory_ = allocate(engine, CL_MEM_READ_ONLY | (bytes.empty() ? cl_mem_flags{0} : CL_MEM_COPY_HOST_PTR), bytes.size(),
+    b.memory_ = allocate(engine, access | (bytes.empty() ? cl_mem_flags{0} : CL_MEM_COPY_HOST_PTR), bytes.size(),
                          bytes.empty() ? nullptr : const_cast<std::byte*>(bytes.data()));
     b.size_ = bytes.size();
     return b;

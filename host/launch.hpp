@@ -22,16 +22,18 @@ class Buffer {
 public:
     Buffer() = default;
     Buffer(const Engine& engine, std::size_t bytes);
-    static Buffer zeroed(const Engine& engine, std::size_t bytes);  ///< for small ones: zeros are copied from the host
+    /// For small ones: zeros are copied from the host. Waits for nothing on the queue.
+    static Buffer zeroed(const Engine& engine, std::size_t bytes);
     static Buffer from_host(const Engine& engine, std::span<const std::byte> bytes,
-                            cl_mem_flags access = CL_MEM_READ_ONLY);                ///< read by kernels
-    static Buffer copy_of(const Engine& engine, std::span<const std::byte> bytes);  ///< the host memory may go at once
-    static Buffer onto_host(const Engine& engine, std::span<std::byte> bytes);      ///< written; see publish()
-    static Buffer over_host(const Engine& engine, std::span<std::byte> bytes);      ///< read, then written; see publish()
+                            cl_mem_flags access = CL_MEM_READ_ONLY);  ///< read by kernels
+    /// The host memory may go at once.
+    static Buffer copy_of(const Engine& engine, std::span<const std::byte> bytes, cl_mem_flags access = CL_MEM_READ_ONLY);
+    static Buffer onto_host(const Engine& engine, std::span<std::byte> bytes);  ///< written; see publish()
+    static Buffer over_host(const Engine& engine, std::span<std::byte> bytes);  ///< read, then written; see publish()
 
     void read(std::span<std::byte> to, std::size_t offset = 0) const;
     void write(std::span<const std::byte> from, std::size_t offset = 0) const;
-    void publish() const;  ///< makes what kernels wrote to an onto_host buffer visible to the host
+    void publish() const;  ///< makes what kernels wrote over or onto the host's memory visible to the host
 
     cl_mem mem() const { return memory_.get(); }
     std::size_t size() const { return size_; }

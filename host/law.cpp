@@ -35,8 +35,11 @@ clr_law_double terms(const Canonical& c, double sd) {
     return m;
 }
 
-// Beyond this the probability is the integral of a smooth function of 1 / x; before it, Owen's T keeps its digits.
-bool far_out(const clr_law_double& m, double q) { return q * std::max(16.0, 0.1 / (m.s * m.s)) < m.s; }
+// Beyond this, and beyond sd, the probability is the integral of a smooth function of 1 / x; before it, Owen's T keeps its
+// digits.
+bool far_out(const clr_law_double& m, const device::clr_law_point_double& x) {
+    return std::abs(x.p) == 1 && x.q * std::max(16.0, 0.1 / (m.s * m.s)) < m.s;
+}
 
 double far_tail(const clr_law_double& m, const device::clr_law_point_double& x) {
     return integrate([&](double q) { return device::clr_law_density(m, device::clr_law_at(m, x.p, q)); }, 0, x.q);
@@ -98,7 +101,7 @@ double ErrorLaw::tail(double x) const {
         return left(x) ? below : 1 - below;
     }
     const auto point = device::clr_law_locate(terms_, x);
-    return terms_.s > 0 && far_out(terms_, point.q) ? far_tail(terms_, point) : device::clr_law_tail(terms_, x);
+    return terms_.s > 0 && far_out(terms_, point) ? far_tail(terms_, point) : device::clr_law_tail(terms_, x);
 }
 
 // On which side x lies as the formulas see it, in units of sd, where the least x may round to 0.

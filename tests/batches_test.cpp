@@ -1,12 +1,14 @@
 // combine_batches: batches that are all there are, combined in one pass.
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <limits>
 #include <thread>
 
 #include "clratio/combine.hpp"
+#include "clratio/fixed.hpp"
 #include "engine_state.hpp"
 #include "launch.hpp"
 #include "moments_state.hpp"
@@ -160,7 +162,8 @@ TEST(Batches, the_estimate_may_take_the_place_of_tau) {
     EXPECT_EQ(over(in.tau, read_out), bits(combine(sum, in.control())));
 }
 
-// The first launch waits at a gate; the read-out after it cannot be built. The caller's memory is his again when he hears of it.
+// The first launch waits at a gate; the read-out after it cannot be built. The caller's memory is his again when he hears of
+// it.
 TEST(Batches, an_error_between_two_launches_comes_after_the_first_has_ended) {
     const Engine engine({.disk_cache = false});
     Moments sum(engine, values);
@@ -178,6 +181,33 @@ TEST(Batches, an_error_between_two_launches_comes_after_the_first_has_ended) {
     clGetEventInfo(sum.state().last.get(), CL_EVENT_COMMAND_EXECUTION_STATUS, sizeof status, &status, nullptr);
     EXPECT_EQ(status, CL_COMPLETE);
     EXPECT_EQ(sum.batches(), 2u);
+    opens.join();
+    clReleaseEvent(gate);
+}
+
+// A state is made, and batches are combined, while everything before them waits at a gate.
+TEST(Batches, event_forms_wait_for_nothing) {
+    const Engine engine;
+    const Input in(1, 999);
+    const Buffer m = Buffer::copy_of(engine, std::as_bytes(std::span(in.m[0]))),
+                 t = Buffer::copy_of(engine, std::as_bytes(std::span(in.t[0]))), out(engine, 999 * sizeof(float));
+    const Batch batch{{m.mem(), 0, 999}, {t.mem(), 0, 999}};
+    const cl_event gate = clCreateUserEvent(engine.context(), nullptr);
+    std::atomic<bool> open = false;
+    std::jthread opens([&] {
+        std::this_thread::sleep_for(std::chrono::seconds(2));
+        open = true;
+        clSetUserEventStatus(gate, CL_COMPLETE);
+    });
+    const auto enqueue = [&] {
+        return Event(combine_batches(engine, {&batch, 1}, batch.t, {{out.mem(), 0, 999}}, {}, {}, {&gate, 1}));
+    };
+    const Event first = enqueue(), second = enqueue();
+    Moments sum(engine, 999);
+    const FixedMoments fixed(engine, 999);
+    const Event added(sum.add(std::span(&batch, 1), {&gate, 1}));
+    EXPECT_FALSE(open);
+    for (const Event& e : {first, second, added}) wait(e);
     opens.join();
     clReleaseEvent(gate);
 }

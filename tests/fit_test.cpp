@@ -122,6 +122,16 @@ TEST(AndersonDarling, known_values) {
     }
 }
 
+TEST(AndersonDarling, large_statistics_have_no_probability) {
+    double last = 1;
+    for (double u = .01; u > 1e-300; u *= u) {
+        const Fit fit = clratio::anderson_darling(Reals(100, u), Reals(100, 1 - u));
+        EXPECT_LE(fit.p, std::min(last, 2e-13)) << fit.statistic;
+        EXPECT_EQ(fit.p + fit.q, 1) << fit.statistic;
+        last = std::max(fit.p, 0.);
+    }
+}
+
 TEST(AndersonDarling, an_impossible_value_rejects) {
     const Fit fit = clratio::anderson_darling(Reals{0, .5}, Reals{1, .5});
     EXPECT_EQ(fit.p, 0);
@@ -194,8 +204,12 @@ TEST(Fit, bad_input_is_refused) {
     EXPECT_THROW(chi_square(Counts{100, 200}, Reals{NAN, .5}), InvalidArgument);
     EXPECT_THROW(chi_square(Counts{0, 0}, Reals{.5, .5}), InvalidArgument);
     EXPECT_THROW(chi_square(Counts{10, 10}, Reals{.5, .5}), InvalidArgument);
+    for (const double least : {0., -1., double{NAN}})
+        EXPECT_THROW(chi_square(Counts{100, 200}, Reals{1, 0}, least), InvalidArgument);
+    EXPECT_THROW(chi_square(Counts{1ull << 63, 1ull << 63}, Reals{.5, .5}), InvalidArgument);
     EXPECT_THROW(kolmogorov_smirnov(Counts{}, Reals{}), InvalidArgument);
     EXPECT_THROW(clratio::anderson_darling(Reals{}, Reals{}), InvalidArgument);
     EXPECT_THROW(clratio::anderson_darling(Reals{.5}, Reals{}), InvalidArgument);
     EXPECT_THROW(clratio::anderson_darling(Reals{1.5}, Reals{-.5}), InvalidArgument);
+    EXPECT_THROW(clratio::anderson_darling(Reals{1}, Reals{1}), InvalidArgument);
 }

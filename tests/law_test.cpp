@@ -205,6 +205,23 @@ TEST(Law, far_tail_joins_owens_form) {
     }
 }
 
+// Where s > 16 no x is too near 0 for the far tail's test of its distance: it was taken there for x within sd, too.
+TEST(Law, probabilities_of_a_wide_denominator_are_the_densitys_integral) {
+    for (const double sigma_t : {15., 17., 40., 1000., 1e4}) {
+        const ErrorLaw law(Law::exact, {.5, 1, .5, sigma_t});
+        for (const double k : {-1e3, -2., -1., -.5, -1e-2, -1e-5, 0., 1e-5, 1e-2, .5, 1., 2., 1e3}) {
+            const double a = k * law.scale(), b = a + .25 * std::max(std::abs(a), 1e-3 * law.scale());
+            std::vector<double> breaks;
+            for (int i = 0; i <= 64; ++i) breaks.push_back(a + (b - a) * i / 64);
+            const double mass = integrate([&](double x) { return law.pdf(x); }, breaks);
+            EXPECT_LE(std::abs(law.cdf(b) - law.cdf(a) - mass), 2e-14) << sigma_t << " " << k;
+            EXPECT_LE(std::abs(law.cdf(a) + law.sf(a) - 1), 1e-15) << sigma_t << " " << k;
+            EXPECT_GE(law.cdf(a), 0) << sigma_t << " " << k;
+        }
+        EXPECT_LE(std::abs(law.cdf(law.quantile(.3)) - .3), 1e-14) << sigma_t;
+    }
+}
+
 TEST(Law, modes_are_where_the_density_is_highest) {
     for (const auto& model : models) {
         const ErrorLaw law(Law::exact, model);

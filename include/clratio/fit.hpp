@@ -26,8 +26,8 @@ struct Fit {
 /// Pearson's chi-square. Shapes: counts and probabilities of the same cells, in order, outer ones (underflow, overflow)
 /// included, so that the probabilities sum to 1 (within 1e-9). Neighbouring cells are pooled until each expects at least
 /// `least_expected` draws. No degree of freedom is taken off: the law's parameters are known.
-/// Errors: InvalidArgument for other shapes, probabilities that are NaN, negative or of another sum, no draws, and fewer
-/// than two cells after pooling. Accuracy of p and q: 1e-12 relative, above 1e-300.
+/// Errors: InvalidArgument for other shapes, probabilities that are NaN, negative or of another sum, no draws or 2^64 of
+/// them, a least_expected that is not above 0, and fewer than two cells after pooling. Accuracy of p and q: 1e-12 relative, above 1e-300.
 /// Source: Pearson 1900; p from the regularised incomplete gamma functions.
 Fit chi_square(std::span<const std::uint64_t> counts, std::span<const double> probabilities, double least_expected = 25);
 
@@ -48,8 +48,8 @@ Fit kolmogorov_smirnov(const Histogram& histogram, const ErrorLaw& law);
 
 /// Anderson and Darling's A^2 for values whose cdf and sf under the law are given (both, so that neither tail loses digits),
 /// in any order. p and q are those of the limiting law, 1e-13 absolute; at n = 100 it is 0.001 off.
-/// Cost: a sorted copy. Errors: InvalidArgument for spans of different or zero length, or values outside [0, 1].
-/// A value of probability 0 gives an infinite statistic and p = 0. Source: Anderson and Darling 1952.
+/// Cost: a sorted copy. Errors: InvalidArgument for spans of different or zero length, or values outside [0, 1],
+/// or a cdf and an sf whose sum is off 1 by more than 1e-3. A value of probability 0 gives an infinite statistic and p = 0. Source: Anderson and Darling 1952.
 Fit anderson_darling(std::span<const double> cdf, std::span<const double> sf);
 
 }  // namespace clratio

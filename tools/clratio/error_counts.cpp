@@ -17,8 +17,9 @@ ErrorLaw ErrorCounts::published() const { return {estimator == Estimator::mc ? L
 std::optional<clratio::Fit> ErrorCounts::fit(const ErrorLaw& law) const {
     try {
         return clratio::chi_square(histogram, law);
-    } catch (const clratio::InvalidArgument&) {
-        return std::nullopt;
+    } catch (const clratio::InvalidArgument& e) {
+        if (e.name != "counts") throw;
+        return std::nullopt;  // too few draws for two cells
     }
 }
 
