@@ -23,11 +23,27 @@ void check_model(const ErrorModel& e) {
     require(e.n >= 1, "n", "at least 1", static_cast<double>(e.n));
 }
 
-// a b - c d within 1.5 ulp (Kahan).
-double difference_of_products(double a, double b, double c, double d) {
-    const double cd = c * d;
-    const double error = std::fma(-c, d, cd);
-    return std::fma(a, b, -cd) + error;
+// rho a b - c d, |rho| <= 1, within a few ulp, also where it cancels (Kahan's difference of products, with rho a to its last
+// bit).
+double difference_of_products(double rho, double a, double b, double c, double d) {
+    const double scaled = rho * a, lost = std::fma(rho, a, -scaled);
+    const double cd = c * d, error = std::fma(-c, d, cd);
+    return std::fma(scaled, b, -cd) + (error + lost * b);
+}
+
+int exponent_of(double x) { return x == 0 ? std::numeric_limits<int>::min() / 2 : std::ilogb(x); }
+
+// r sigma_m - mu sigma_t / c, on numbers near 1, so that no product overflows or vanishes.
+double slope_term(double r, double sigma_m, double mu, double sigma_t, double c) {
+    const int c_scale = exponent_of(c), t_scale = exponent_of(sigma_t) - c_scale;
+    const int scale = std::max(exponent_of(sigma_m), exponent_of(mu) + t_scale);
+    if (scale < -2000) return 0;
+    const int left = exponent_of(sigma_m) - scale, right = exponent_of(mu) + t_scale - scale;  // one of them is 0
+    const auto near_1 = [](double x) { return x == 0 ? 0 : std::scalbn(x, -std::ilogb(x)); };
+    const double unit_c = std::scalbn(c, -c_scale);
+    const double difference = difference_of_products(r, std::scalbn(near_1(sigma_m), left), unit_c,
+                                                     std::scalbn(near_1(mu), right), near_1(sigma_t));
+    return std::scalbn(difference / unit_c, scale);
 }
 
 }  // namespace
@@ -37,8 +53,7 @@ Canonical canonical(const ErrorModel& e) {
     const double c = e.tau == 0 ? 1 : e.tau;
     const double scale = std::sqrt(static_cast<double>(e.n));
     const double r = std::copysign(1.0, c) * e.rho;
-    const Canonical out{e.sigma_t / std::abs(c) / scale,
-                        difference_of_products(r * e.sigma_m, std::abs(c), e.mu, e.sigma_t) / std::abs(c) / scale,
+    const Canonical out{e.sigma_t / std::abs(c) / scale, slope_term(r, e.sigma_m, e.mu, e.sigma_t, std::abs(c)) / scale,
                         e.sigma_m * std::sqrt((1 - r) * (1 + r)) / scale};
     require(std::isfinite(out.s), "sigma_t / |tau|", "a number below overflow", out.s);
     require(std::isfinite(out.a), "mu sigma_t / |tau|", "a number below overflow", out.a);

@@ -89,9 +89,7 @@ double anderson_darling_below(double z) {
     return std::clamp(std::sqrt(2 * pi) / z * sum, 0.0, 1.0);
 }
 
-std::vector<double> cell_probabilities(const Histogram& h, const ErrorLaw& law) {
-    return law.bin_probabilities(h.lo, h.hi, static_cast<std::uint32_t>(h.bins.size()));
-}
+std::vector<double> cell_probabilities(const Histogram& h, const ErrorLaw& law) { return law.bin_probabilities(h.edges()); }
 
 Fit with_nan_rejected(Fit fit, const Histogram& h) {
     if (h.nonfinite == 0) return fit;

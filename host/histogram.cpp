@@ -1,8 +1,11 @@
 #include "clratio/histogram.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <limits>
 #include <numeric>
+#include <type_traits>
 
 #include "draws.hpp"
 
@@ -13,10 +16,8 @@ constexpr std::uint64_t samples_a_launch = std::uint64_t{1} << 28;  // 32-bit co
 constexpr std::uint64_t least_samples_a_model = std::uint64_t{1} << 16;
 constexpr std::uint64_t row_memory = std::uint64_t{16} << 20;  // bytes
 
-template <class Real> struct DeviceBins {
-    Real lo, hi, inverse_width;
-    std::uint32_t count;
-};
+template <class Real>
+using DeviceBins = std::conditional_t<std::is_same_v<Real, float>, device::clr_bins, device::clr_bins_double>;
 
 template <class Real> DeviceBins<Real> device_bins(const Bins& bins) {
     if (bins.count < 1 || bins.count > (1u << 23))
@@ -197,7 +198,47 @@ std::uint64_t Histogram::total() const {
     return std::accumulate(bins.begin(), bins.end(), underflow + overflow + nonfinite);
 }
 
+namespace {
+
+/// Floats in order as integers.
+std::int32_t rank_of(float x) {
+    const auto bits = std::bit_cast<std::int32_t>(x);
+    return bits < 0 ? std::numeric_limits<std::int32_t>::min() - bits : bits;
+}
+float float_of(std::int32_t rank) {
+    return std::bit_cast<float>(rank < 0 ? std::numeric_limits<std::int32_t>::min() - rank : rank);
+}
+
+/// The least float in [lo, hi] that is not counted below bin i.
+float least_in(const device::clr_bins& bins, std::uint32_t i) {
+    std::int32_t low = rank_of(bins.lo), high = rank_of(bins.hi);
+    while (low < high) {
+        const auto middle = static_cast<std::int32_t>((std::int64_t{low} + high) >> 1);
+        if (device::clr_slot(bins, float_of(middle)) < i)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return float_of(low);
+}
+
+}  // namespace
+
+std::vector<double> Histogram::edges() const {
+    const auto count = static_cast<std::uint32_t>(bins.size());
+    std::vector<double> nominal, counted;
+    for (std::uint32_t i = 0; i < count; ++i) nominal.push_back(lo + (hi - lo) * i / count);
+    if (count > 0) nominal.push_back(hi);
+    if (count == 0 || precision == Precision::double_precision) return nominal;
+    const auto b = device_bins<float>({lo, hi, count});
+    for (std::uint32_t i = 0; i < count; ++i) counted.push_back(least_in(b, i));
+    counted.push_back(b.hi);
+    const bool all_hold_some = std::adjacent_find(counted.begin(), counted.end()) == counted.end();
+    return all_hold_some ? counted : nominal;
+}
+
 Histogram& Histogram::operator+=(const Histogram& other) {
+    if (precision != other.precision) throw InvalidArgument("histogram", "the same precision", "another");
     if (bins.size() != other.bins.size() || lo != other.lo || hi != other.hi)
         throw InvalidArgument("histogram", "the same bins",
                               std::to_string(other.bins.size()) + " bins on [" + std::to_string(other.lo) + ", " +
@@ -212,7 +253,6 @@ Histogram& Histogram::operator+=(const Histogram& other) {
 ErrorHistogram& ErrorHistogram::operator+=(const ErrorHistogram& other) {
     if (!same(law, other.law)) throw InvalidArgument("histogram", "the same law", "another");
     if (!same(stream, other.stream)) throw InvalidArgument("histogram", "the same stream", "another");
-    if (precision != other.precision) throw InvalidArgument("histogram", "the same precision", "another");
     auto all = ranges;
     all.insert(all.end(), other.ranges.begin(), other.ranges.end());
     all = join(std::move(all));

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <string>
 
 #include "law_integral.hpp"
@@ -74,6 +75,9 @@ void check_edges(std::span<const double> edges) {
 ErrorLaw::ErrorLaw(Law law, const ErrorModel& model)
     : law_(law), model_(model), canonical_(canonical_of(law, model)), sd_(std::hypot(canonical_.a, canonical_.b)),
       terms_(terms(canonical_, sd_)) {
+    if (!std::isfinite(sd_))
+        throw InvalidArgument("error model: sigma_m", "a standard deviation of the error below overflow",
+                              std::to_string(sd_));
     if (integral() && canonical_.s > 0 && canonical_.b == 0)
         throw InvalidArgument("law", "one in closed form where |rho| = 1 or sigma_m = 0", "an integral");
 }
@@ -152,9 +156,11 @@ std::vector<double> ErrorLaw::modes() const {
     std::vector<std::pair<double, double>> found;
     for (std::size_t i = 1; i + 1 < grid.size(); ++i) {
         if (!(height[i] > height[i - 1] && height[i] >= height[i + 1])) continue;
-        const auto depth = [&](double x) { return -log_pdf(x); };
-        const auto [x, least] = boost::math::tools::brent_find_minima(depth, grid[i - 1], grid[i + 1], 40);
-        found.emplace_back(least, x);
+        // Over a part of the bracket: Brent's search ends at an absolute 1e-8.
+        const auto at = [&](double part) { return grid[i - 1] + part * (grid[i + 1] - grid[i - 1]); };
+        const auto depth = [&](double part) { return -log_pdf(at(part)); };
+        const auto [part, least] = boost::math::tools::brent_find_minima(depth, 0.0, 1.0, 40);
+        found.emplace_back(least, at(part));
     }
     std::sort(found.begin(), found.end());
     std::vector<double> out;
@@ -194,17 +200,33 @@ std::vector<double> ErrorLaw::bin_probabilities(std::span<const double> edges) c
     return out;
 }
 
-std::vector<double> ErrorLaw::bin_probabilities(double lo, double hi, std::uint32_t count) const {
+namespace {
+
+std::vector<double> equal_edges(double lo, double hi, std::uint32_t count) {
     std::vector<double> edges{lo};
     for (std::uint32_t i = 1; i < count; ++i) edges.push_back(lo + (hi - lo) * i / count);
     if (count > 0) edges.push_back(hi);
-    return bin_probabilities(edges);
+    return edges;
 }
 
-std::vector<double> ErrorLaw::improper_masses(std::span<const double> edges) const {
-    const ErrorLaw exact(Law::exact, model_);
-    std::vector<double> out{exact.cdf(edges.front())};
-    double sum = 0;
+}  // namespace
+
+std::vector<double> ErrorLaw::bin_probabilities(double lo, double hi, std::uint32_t count) const {
+    return bin_probabilities(equal_edges(lo, hi, count));
+}
+
+std::vector<double> ErrorLaw::bin_densities(double lo, double hi, std::uint32_t count) const {
+    const auto edges = equal_edges(lo, hi, count);
+    check_edges(edges);
+    auto masses = improper() ? integrals(edges) : bin_probabilities(edges);
+    if (!improper()) masses = {masses.begin() + 1, masses.end() - 1};
+    for (double& mass : masses) mass *= count / (hi - lo);
+    return masses;
+}
+
+/// Of the density over each bin.
+std::vector<double> ErrorLaw::integrals(std::span<const double> edges) const {
+    std::vector<double> out;
     for (std::size_t i = 1; i < edges.size(); ++i) {
         const double width = edges[i] - edges[i - 1];
         const int panels = static_cast<int>(std::clamp(std::ceil(2 * width / canonical_.b), 1.0, 1000.0));
@@ -213,10 +235,18 @@ std::vector<double> ErrorLaw::improper_masses(std::span<const double> edges) con
             mass += integrate([&](double x) { return pdf(x); }, edges[i - 1] + width * k / panels,
                               edges[i - 1] + width * (k + 1) / panels);
         out.push_back(mass);
-        sum += mass;
     }
-    out.push_back(exact.sf(edges.back()));
-    for (std::size_t i = 1; i + 1 < out.size(); ++i) out[i] *= (1 - out.front() - out.back()) / sum;
+    return out;
+}
+
+std::vector<double> ErrorLaw::improper_masses(std::span<const double> edges) const {
+    const ErrorLaw exact(Law::exact, model_);
+    std::vector<double> out = integrals(edges);
+    const double below = exact.cdf(edges.front()), above = exact.sf(edges.back());
+    const double sum = std::accumulate(out.begin(), out.end(), 0.0);
+    for (double& mass : out) mass *= (1 - below - above) / sum;
+    out.insert(out.begin(), below);
+    out.push_back(above);
     return out;
 }
 

@@ -137,8 +137,8 @@ TEST(Errors, csv_holds_every_cell) {
         EXPECT_EQ(total, 100000u);
         ErrorModel m = paper;
         m.n = start ? 2 : 1;
-        const auto exact = ErrorLaw(Law::exact, m).bin_probabilities(-2, 3, 50);
-        const auto published = ErrorLaw(Law::published, m).bin_probabilities(-2, 3, 50);
+        const auto exact = ErrorLaw(Law::exact, m).bin_densities(-2, 3, 50);
+        const auto published = ErrorLaw(Law::published, m).bin_densities(-2, 3, 50);
         EXPECT_EQ(csv.rows[start][2], "-inf");
         EXPECT_EQ(csv.rows[start + 51][3], "inf");
         EXPECT_EQ(csv.rows[start + 52][2], "nan");
@@ -147,8 +147,8 @@ TEST(Errors, csv_holds_every_cell) {
             EXPECT_NEAR(csv.number(i, 2), -2 + .1 * static_cast<double>(b - 1), 1e-15);
             EXPECT_EQ(csv.rows[i][3], b < 50 ? csv.rows[i + 1][2] : "3");
             EXPECT_DOUBLE_EQ(csv.number(i, 5), static_cast<double>(csv.count(i)) / 1e4);
-            EXPECT_NEAR(csv.number(i, 6), exact[b] / .1, 1e-12);
-            EXPECT_NEAR(csv.number(i, 7), published[b] / .1, 1e-12);
+            EXPECT_NEAR(csv.number(i, 6), exact[b - 1], 1e-15);
+            EXPECT_NEAR(csv.number(i, 7), published[b - 1], 1e-15);
         }
     }
 }

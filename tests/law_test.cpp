@@ -55,6 +55,25 @@ TEST(Error, m_proportional_to_t_has_no_residual) {
     EXPECT_EQ(c.b, 0);
 }
 
+// Values from 60-digit arithmetic; the first three lose all digits of a where a product is rounded, vanishes or overflows.
+TEST(Error, a_keeps_its_digits_where_its_terms_cancel_and_where_products_leave_the_range) {
+    struct Case {
+        ErrorModel model;
+        double a;
+    };
+    const Case cases[] = {
+        {{.7, 1, .14, .18, .9}, 2.7755575615628914e-17},
+        {{-2.4551665823715934, -1, .08476586427009128, .03452550424839018, .999999999981079}, 1.6886237984080623e-12},
+        {{1e-158, 1e-158, 0, 1e-158}, -1e-158},
+        {{1e-170, 1e-170, 0, 1e-170}, -1e-170},
+        {{1e200, 1e200, 0, 1e200}, -1e200},
+        {{1, 1e200, 1e150, 1e150, .5}, 5e149},
+        {{0, 1e-300, 1e300, 0, 1}, 1e300},
+        {{1e-300, 1e-300, 0, 5e-324}, -5e-324}};
+    for (const auto& [model, a] : cases) EXPECT_LE(relative(canonical(model).a, a), 1e-15) << text(model);
+    EXPECT_EQ(canonical({0, 0, 0, 0}).a, 0);
+}
+
 TEST(Error, bad_parameters_are_refused_by_name) {
     const auto refused = [](const ErrorModel& e) -> std::string {
         try {
@@ -218,7 +237,8 @@ TEST(Law, probabilities_of_a_wide_denominator_are_the_densitys_integral) {
             EXPECT_LE(std::abs(law.cdf(a) + law.sf(a) - 1), 1e-15) << sigma_t << " " << k;
             EXPECT_GE(law.cdf(a), 0) << sigma_t << " " << k;
         }
-        EXPECT_LE(std::abs(law.cdf(law.quantile(.3)) - .3), 1e-14) << sigma_t;
+        const double x = law.quantile(.3);  // within a few ulp
+        EXPECT_LE(std::abs(law.cdf(x) - .3), 1e-14 + 4 * 0x1p-52 * std::abs(x) * law.pdf(x)) << sigma_t;
     }
 }
 
@@ -237,6 +257,12 @@ TEST(Law, modes_are_where_the_density_is_highest) {
     EXPECT_NEAR(paper.bias(), .10, 5e-3);
     EXPECT_EQ(paper.modes().size(), 1u);
     EXPECT_NEAR(ErrorLaw(Law::exact, {0, 1, .5, .3}).modes()[0], 0, 1e-7);
+    for (const double unit : {1e-12, 1e-6, 1e9}) {
+        const ErrorLaw other(Law::exact, {.5 * unit, 1, .5 * unit, .35});
+        EXPECT_LE(relative(other.modes()[0], paper.modes()[0] * unit), 1e-7) << unit;
+    }
+    const ErrorLaw many(Law::exact, {.5, 1, .5, .35, 0, 1'000'000'000'000'000'000});
+    EXPECT_LE(std::abs(many.modes()[0]), 1e-7 * many.scale());
     const ErrorLaw bimodal(Law::exact, {3, 1, .5, .35});
     ASSERT_EQ(bimodal.modes().size(), 2u);
     const double second = bimodal.modes()[1];
@@ -356,6 +382,23 @@ TEST(LawBins, sum_to_one_and_are_the_density) {
                 EXPECT_NEAR(p[i + 1], mass, 1e-15 + 1e-12 * mass) << text(model) << i;
             }
         }
+}
+
+// Of the published law too, whose integral over the line is infinite: nothing is scaled.
+TEST(LawBins, densities_are_averages_of_the_density) {
+    for (const Law kind : {Law::exact, Law::published, Law::mc}) {
+        const ErrorLaw law(kind, {.5, 1, .5, .35});
+        const auto densities = law.bin_densities(-1, 1, 50);
+        ASSERT_EQ(densities.size(), 50u);
+        for (int i = 0; i < 50; ++i) {
+            const double low = -1 + .04 * i;
+            const double mean = integrate([&](double x) { return law.pdf(x); }, low, low + .04) / .04;
+            EXPECT_LE(relative(densities[static_cast<std::size_t>(i)], mean), 1e-12) << i;
+        }
+    }
+    EXPECT_NE(ErrorLaw(Law::published, {.5, 1, .5, .35}).bin_densities(-1, 1, 50)[25],
+              25 * ErrorLaw(Law::published, {.5, 1, .5, .35}).bin_probabilities(-1, 1, 50)[26])
+        << "planted fault: scaled";
 }
 
 TEST(LawBins, far_tails_keep_their_digits) {

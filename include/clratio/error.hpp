@@ -24,7 +24,7 @@ struct ErrorModel {
 using Canonical = device::clr_canonical_double;
 
 /// With c = tau + i:  s = sigma_t / (|c| sqrt n),  a = (sign(c) rho sigma_m - mu sigma_t / |c|) / sqrt n,
-/// b = sigma_m sqrt(1 - rho^2) / sqrt n; each within a few ulp, a also where its terms cancel (rho = +-1).
+/// b = sigma_m sqrt(1 - rho^2) / sqrt n; each within a few ulp, a also where its terms cancel.
 /// Errors: InvalidArgument names the parameter that is NaN, infinite or out of range, and an s or a that overflows.
 Canonical canonical(const ErrorModel& model);
 

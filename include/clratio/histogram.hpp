@@ -27,6 +27,8 @@ struct IndexRange {
     bool operator==(const IndexRange&) const = default;
 };
 
+enum class Precision { single_precision, double_precision };
+
 /// Counts always add up to the number of values: what no bin holds is counted apart.
 struct Histogram {
     std::vector<std::uint64_t> bins;
@@ -34,19 +36,20 @@ struct Histogram {
     std::uint64_t overflow = 0;   ///< x >= hi, +inf too
     std::uint64_t nonfinite = 0;  ///< NaN
     double lo = 0, hi = 0;
+    Precision precision = Precision::single_precision;  ///< of the values that were counted
 
     std::uint64_t total() const;
-    /// Errors: InvalidArgument for other bins.
+    /// The count + 1 edges as the counting sees them: the least number of each bin, up to 2^-22 (hi - lo) beside the edges
+    /// of bins of equal width; those where bins are so narrow that some hold no number, and in double precision.
+    std::vector<double> edges() const;
+    /// Errors: InvalidArgument for other bins or another precision.
     Histogram& operator+=(const Histogram& other);
 };
-
-enum class Precision { single_precision, double_precision };
 
 /// The histogram of some samples of one law and stream: parts computed anywhere can be added.
 struct ErrorHistogram : Histogram {
     Canonical law{};
-    Stream stream{};  ///< the one drawn from, in the domain `error`
-    Precision precision = Precision::single_precision;
+    Stream stream{};                   ///< the one drawn from, in the domain `error`
     std::vector<IndexRange> ranges{};  ///< the samples in it, in order, neighbours joined
 
     /// Errors: InvalidArgument for another law, stream, precision or other bins, and where both hold the same sample.

@@ -38,7 +38,8 @@ public:
     double log_pdf(double x) const;
     double cdf(double x) const;
     double sf(double x) const;  ///< 1 - cdf, accurate in the upper tail
-    /// x with cdf(x) = p within a few ulp of x; p = 0 and 1 give -inf and +inf. InvalidArgument outside [0, 1].
+    /// x with cdf(x) = p within a few ulp of x; p = 0 and 1 give -inf and +inf, of a point mass 0 as all p do.
+    /// InvalidArgument outside [0, 1].
     double quantile(double p) const;
 
     double median() const { return quantile(0.5); }
@@ -69,12 +70,17 @@ public:
     /// What kernels read. Errors: InvalidArgument where float overflows, and for the two integrals.
     device::clr_law device_form() const;
 
+    /// Averages of the density over `count` bins of equal width on [lo, hi): of the published law as it stands, unscaled.
+    /// Errors as above.
+    std::vector<double> bin_densities(double lo, double hi, std::uint32_t count) const;
+
 private:
     bool integral() const { return law_ == Law::integral || law_ == Law::exact_integral; }
     bool improper() const;  ///< no finite integral
     bool left(double x) const;
     double tail(double x) const;
     double tail_quantile(double probability, double sign) const;
+    std::vector<double> integrals(std::span<const double> edges) const;
     std::vector<double> improper_masses(std::span<const double> edges) const;
 
     Law law_;

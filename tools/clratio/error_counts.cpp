@@ -44,16 +44,15 @@ const char* const csv_header = "estimator,n,lo,hi,count,density,exact,published\
 void write_csv(OutputFile& out, const ErrorCounts& counts) {
     const auto& h = counts.histogram;
     const auto bins = static_cast<std::uint32_t>(h.bins.size());
-    const auto exact = counts.exact().bin_probabilities(h.lo, h.hi, bins);
-    const auto published = counts.published().bin_probabilities(h.lo, h.hi, bins);
+    const auto exact = counts.exact().bin_densities(h.lo, h.hi, bins);
+    const auto published = counts.published().bin_densities(h.lo, h.hi, bins);
     const double width = counts.bin_width(), samples = static_cast<double>(h.total());
     const std::string head = fmt::format("{},{},", name_of(counts.estimator), counts.model.n);
     const auto edge = [&](std::uint32_t i) { return i == bins ? h.hi : h.lo + (h.hi - h.lo) * i / bins; };
     out.write(fmt::format("{}-inf,{},{},,,\n", head, h.lo, h.underflow));
     for (std::uint32_t i = 0; i < bins; ++i)
         out.write(fmt::format("{}{},{},{},{},{},{}\n", head, edge(i), edge(i + 1), h.bins[i],
-                              static_cast<double>(h.bins[i]) / (samples * width), exact[i + 1] / width,
-                              published[i + 1] / width));
+                              static_cast<double>(h.bins[i]) / (samples * width), exact[i], published[i]));
     out.write(fmt::format("{}{},inf,{},,,\n", head, h.hi, h.overflow));
     out.write(fmt::format("{}nan,nan,{},,,\n", head, h.nonfinite));
 }
