@@ -52,6 +52,7 @@ bool BatchRanges::contains(std::uint64_t index) const {
 std::uint64_t BatchRanges::count() const { return count(0, 1); }
 
 std::uint64_t BatchRanges::count(std::uint64_t group, std::uint64_t groups) const {
+    if (groups == 0) throw InvalidArgument("groups", "at least 1", "0");
     std::uint64_t sum = 0;
     for (const Range& r : ranges_) sum += below(r.end, group, groups) - below(r.begin, group, groups);
     return sum;
@@ -61,6 +62,16 @@ std::optional<Range> BatchRanges::overlap(const BatchRanges& other) const {
     for (const Range& a : ranges_)
         for (const Range& b : other.ranges_)
             if (!apart(a, b)) return Range{std::max(a.begin, b.begin), std::min(a.end, b.end)};
+    return std::nullopt;
+}
+
+std::optional<std::uint64_t> BatchRanges::first_beyond(const BatchRanges& other) const {
+    for (const Range& r : ranges_) {
+        std::uint64_t k = r.begin;
+        for (const Range& o : other.ranges_)
+            if (o.begin <= k && k < o.end) k = o.end;
+        if (k < r.end) return k;
+    }
     return std::nullopt;
 }
 

@@ -45,6 +45,9 @@ void check_tau(const Tau& tau, std::uint64_t count) {
     if (tau.numbers.empty()) return check_size("tau", tau.image.size(), count);
     for (float x : tau.numbers)
         if (!std::isfinite(x)) throw InvalidArgument("tau", "a finite number", std::to_string(x));
+    if (tau.channels != tau.numbers.size())
+        throw InvalidArgument("tau", std::to_string(tau.channels) + " numbers, one for each channel",
+                              std::to_string(tau.numbers.size()));
     if (count % tau.channels != 0)
         throw InvalidArgument("tau", "as many numbers as channels",
                               std::to_string(tau.channels) + " for " + std::to_string(count) + " values");
@@ -378,7 +381,7 @@ Combined add_and_combine(Moments& moments, std::span<const HostBatch> batches, c
     if (batches.empty()) throw InvalidArgument("batches", "at least 1", "0");
     check_tau(tau, s.values);
     const OnDevice in = put_on_device(s.engine, s.values, s.options.nonfinite, batches);
-    check_room(s.batches(), batches.size());
+    check_room(s, batches.size(), sum_of_squares(batches));
     Combined result = sized(s.values, options, std::move(reuse));
     HostReading out(s.engine, result, tau);
     const Reading reading = out.reading(options);
@@ -402,7 +405,7 @@ cl_event add_and_combine(Moments& moments, std::span<const Batch> batches, View 
     check_estimator(options, s.options);
     check_one_launch(batches.size());
     check_batches(s.values, s.options.nonfinite, batches);
-    check_room(s.batches(), batches.size());
+    check_room(s, batches.size(), sum_of_squares(batches));
     const Reading reading{tau, out, options};
     reading.check(s.values);
     if (fuses(s, reading)) return add_to_group(s, 0, batches, &reading, wait_list).give();

@@ -61,7 +61,7 @@ std::size_t filled(std::span<const Statistics> groups) {
 double ratio(const Statistics& s) { return s.mean_m / s.mean_t; }
 double slope(const Statistics& s) { return s.m2_t > 0 ? s.c_mt / s.m2_t : 0; }
 
-/// Sums of squares and of products with t of the residual m - r t.
+/// The sum of squares of the residual m - r t.
 double residual(const Statistics& s, double r) { return s.m2_m - r * (2 * s.c_mt - r * s.m2_t); }
 double regression_residual(const Statistics& s) { return s.m2_t > 0 ? s.m2_m - s.c_mt * s.c_mt / s.m2_t : s.m2_m; }
 

@@ -35,6 +35,12 @@ void require_channels(const Image& image) {
     if (unique.empty() || unique.size() != image.channels.size() || unique.count("") != 0)
         throw InvalidArgument("channels", "one or more different names",
                               std::to_string(image.channels.size()) + " channels");
+    for (const std::string& name : image.channels)
+        if (name.size() > longest_name)
+            throw InvalidArgument("channels", "names of at most " + std::to_string(longest_name) + " bytes",
+                                  std::to_string(name.size()) + ": " + name.substr(0, 32) + "..");
+    if (unique.count("A") != 0 && !image.alpha.empty())
+        throw InvalidArgument("channels", "no A where alpha is given apart", "both");
     if (image.width() < 1 || image.height() < 1)
         throw InvalidArgument("data_window", "at least one pixel",
                               std::to_string(image.width()) + " x " + std::to_string(image.height()));

@@ -28,10 +28,12 @@ inline void add_slices(Imf::FrameBuffer& frame, const std::vector<std::string>& 
         frame.insert(channels[c], Imf::Slice::Make(type, first + 4 * c, window, pixel, row));
 }
 
+inline constexpr std::size_t longest_name = 255;  ///< of a channel: OpenEXR cuts longer ones without a word
+
 /// Adds the attributes that describe the picture, not the layout of the file it was read from.
 void carry_metadata(const Image::Metadata& from, Imf::Header& to);
 
-/// Throws InvalidArgument unless the image has channels of different names and at least one pixel.
+/// Throws InvalidArgument unless the image has channels of different names that fit, and at least one pixel.
 void require_channels(const Image& image);
 
 /// A damaged header can ask for any amount of memory. No compression of OpenEXR packs values more tightly than this; throws

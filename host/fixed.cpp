@@ -262,7 +262,7 @@ Launch& State::give_planes(Launch& launch) const {
 
 FixedMoments::FixedMoments(const Engine& engine, std::uint64_t values, FixedOptions options) {
     check_options(options);
-    if (values == 0) throw InvalidArgument("values", "at least 1", "0");
+    check_values(values);
     state_ = std::make_shared<State>(engine, values, options);
     state_->rows = make_rows(engine);
     for (const Shape& shape : shapes_of(options)) {
@@ -335,7 +335,7 @@ void FixedMoments::merge(const FixedMoments& other) { wait(Event(merge(other, {}
 
 void FixedMoments::clear() {
     State& s = *state_;
-    wait(s.last);
+    s.last = forget(std::move(s.last));
     s.rows.write(std::vector<std::byte>(s.rows.size()));
     s.batches = s.weight = 0;
 }
@@ -415,6 +415,7 @@ FixedMoments::FixedMoments(const Engine& engine, const Snapshot& snapshot)
     State& s = *state_;
     s.weight = weight_of(snapshot, s.options);
     s.batches = snapshot.groups.front().batches;
+    clratio::check_room(0, s.batches);
     const auto shapes = shapes_of(s.options);
     std::size_t planes = 0;
     for (const Shape& shape : shapes) planes += words_of(shape);

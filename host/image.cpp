@@ -31,7 +31,10 @@ Image in_the_shape_of(const Image& like, std::vector<float>&& values) {
 
 }  // namespace
 
-void set_image_threads(unsigned count) { Imf::setGlobalThreadCount(static_cast<int>(count)); }
+void set_image_threads(unsigned count) {
+    if (count > 1024) throw InvalidArgument("threads", "0 to 1024", std::to_string(count));
+    Imf::setGlobalThreadCount(static_cast<int>(count));
+}
 
 void require_same_shape(const Image& a, const Image& b) {
     if (a.channels != b.channels || a.data_window != b.data_window || a.display_window != b.display_window)

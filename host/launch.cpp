@@ -132,8 +132,18 @@ constexpr std::uint64_t block = 32;  // vectors: ranges are cut between whole bl
 
 std::uint64_t most_groups(const Engine::State& s) { return 64ull * std::max(1u, s.info.compute_units); }
 
-bool same_elements(const View& a, const View& b) {
-    return a.offset == b.offset && a.stride == b.stride && a.channels == b.channels;
+/// Bytes of a view in the buffer that its own may be a part of.
+struct Place {
+    cl_mem root;
+    std::uint64_t begin, end;
+};
+
+Place place_of(const View& view) {
+    cl_mem parent = nullptr;
+    std::size_t from = 0;
+    check(clGetMemObjectInfo(view.mem, CL_MEM_ASSOCIATED_MEMOBJECT, sizeof parent, &parent, nullptr), "clGetMemObjectInfo");
+    if (parent) check(clGetMemObjectInfo(view.mem, CL_MEM_OFFSET, sizeof from, &from, nullptr), "clGetMemObjectInfo");
+    return {parent ? parent : view.mem, from + view.offset * sizeof(float), from + view.end() * sizeof(float)};
 }
 
 }  // namespace
@@ -166,12 +176,14 @@ void check_output(const char* name, const View& view, std::uint64_t count, std::
 }
 
 void check_apart(const char* name, const View& output, const char* other_name, const View& other) {
-    if (output.mem == other.mem && output.offset < other.end() && other.offset < output.end())
+    const Place a = place_of(output), b = place_of(other);
+    if (a.root == b.root && a.begin < b.end && b.begin < a.end)
         throw InvalidArgument(name, std::string("a view apart from ") + other_name, "one that overlaps it");
 }
 
 void check_overlap(const char* name, const View& output, const char* other_name, const View& other) {
-    if (output.mem == other.mem && same_elements(output, other)) return;
+    const Place a = place_of(output), b = place_of(other);
+    if (a.root == b.root && a.begin == b.begin && output.stride == other.stride && output.channels == other.channels) return;
     check_apart(name, output, (std::string(other_name) + ", or the very same").c_str(), other);
 }
 
@@ -193,9 +205,24 @@ Launch& Launch::arg(cl_mem mem) { return raw(&mem, sizeof mem); }
 
 Launch& Launch::view(const View& v) { return arg(v.mem).arg(layout(v)); }
 
+// A driver may wait for ever for what has failed before (PoCL 3.1 does).
+void require_not_failed(cl_event event) {
+    cl_int status = CL_COMPLETE;
+    check(clGetEventInfo(event, CL_EVENT_COMMAND_EXECUTION_STATUS, sizeof status, &status, nullptr), "clGetEventInfo");
+    if (status < 0) throw DeviceError("a command that was to be waited for", status);
+}
+
+Event forget(Event last) {
+    if (const cl_event event = last.get()) clWaitForEvents(1, &event);
+    return {};
+}
+
 Launch& Launch::after(std::span<const cl_event> events) {
-    for (cl_event e : events)
-        if (e) waits_.push_back(e);
+    for (cl_event e : events) {
+        if (!e) continue;
+        require_not_failed(e);
+        waits_.push_back(e);
+    }
     return *this;
 }
 

@@ -61,6 +61,11 @@ void refuse_nonfinite(const Engine& engine, std::span<const Batch> batches) {
                                   std::to_string(bad) + " NaN or infinite ones");
 }
 
+/// Of m or t, where there are several.
+std::string name_in(const char* name, std::size_t batch, std::size_t batches) {
+    return batches == 1 ? name : std::string(name) + " of batch " + std::to_string(batch);
+}
+
 std::uint64_t tally(const Moments::State& s, std::size_t which) {
     wait(s.last);
     return sums_of_rows<CLR_TALLY_ADD>(s.add_rows)[which];
@@ -80,7 +85,7 @@ std::uint64_t bytes_of(cl_mem StatePlanes::*plane, std::uint64_t values, const M
 }
 
 std::shared_ptr<Moments::State> make_state(const Engine& engine, std::uint64_t values, MomentsOptions options) {
-    if (values == 0) throw InvalidArgument("values", "at least 1", "0");
+    check_values(values);
     if (options.groups < 1 || options.groups > CLR_MOST_GROUPS)
         throw InvalidArgument("groups", "1 to " + std::to_string(CLR_MOST_GROUPS), std::to_string(options.groups));
     auto s = std::make_shared<Moments::State>(engine, values, options);
@@ -198,19 +203,33 @@ Event add_to_group(Moments::State& s, std::size_t group, std::span<const Batch> 
     return s.last;
 }
 
+void check_values(std::uint64_t values) {
+    constexpr std::uint64_t most = std::uint64_t{1} << 50;  // bytes of planes and ends of views stay below 2^64
+    if (values == 0 || values > most) throw InvalidArgument("values", "1 to 2^50", std::to_string(values));
+}
+
 void check_room(std::uint64_t batches, std::uint64_t more) {
     constexpr std::uint64_t most = std::numeric_limits<std::uint32_t>::max();
     if (more > most - batches)
         throw InvalidArgument("batches", "at most 2^32 - 1 in one state", std::to_string(batches + more));
 }
 
+void check_room(const Moments::State& s, std::uint64_t more, double squares) {
+    check_room(s.batches(), more);
+    for (const auto& g : s.groups) squares += static_cast<double>(g.weight2.hi);
+    if (squares < 0x1.fffffp127) return;
+    std::ostringstream got;
+    got << squares;
+    throw InvalidArgument("weight", "weights whose squares sum to less than 2^128", got.str());
+}
+
 void check_batches(std::uint64_t values, NonFinite nonfinite, std::span<const Batch> batches) {
     if (nonfinite == NonFinite::fail)
         throw InvalidArgument("NonFinite::fail", "a blocking call, which can look at the batch first", "the event form");
-    for (const auto& b : batches) {
-        check_weight(b.weight);
-        check_view("m", b.m, values);
-        check_view("t", b.t, values);
+    for (std::size_t k = 0; k < batches.size(); ++k) {
+        check_weight(batches[k].weight);
+        check_view(name_in("m", k, batches.size()).c_str(), batches[k].m, values);
+        check_view(name_in("t", k, batches.size()).c_str(), batches[k].t, values);
     }
 }
 
@@ -249,15 +268,17 @@ void Moments::add(std::span<const float> m, std::span<const float> t, double wei
 
 OnDevice put_on_device(const Engine& engine, std::uint64_t count, NonFinite nonfinite, std::span<const HostBatch> batches) {
     OnDevice out;
-    const auto put = [&](const char* name, std::span<const float> values) -> View {
+    const auto put = [&](const char* name, std::size_t k, std::span<const float> values) -> View {
         if (values.size() != count)
-            throw InvalidArgument(name, std::to_string(count) + " values", std::to_string(values.size()));
+            throw InvalidArgument(name_in(name, k, batches.size()), std::to_string(count) + " values",
+                                  std::to_string(values.size()));
         out.memory.push_back(Buffer::from_host(engine, std::as_bytes(values)));
         return {out.memory.back().mem(), 0, count};
     };
-    for (const auto& b : batches) {
+    for (std::size_t k = 0; k < batches.size(); ++k) {
+        const HostBatch& b = batches[k];
         check_weight(b.weight);
-        const View m = put("m", b.m), t = put("t", b.t);
+        const View m = put("m", k, b.m), t = put("t", k, b.t);
         out.batches.push_back({m, t, b.weight, b.index});
     }
     if (nonfinite == NonFinite::fail) refuse_nonfinite(engine, out.batches);
@@ -282,7 +303,7 @@ Event add_batches(Moments::State& s, std::span<const Batch> batches, std::span<c
 void Moments::add(std::span<const HostBatch> batches) {
     auto& s = *state_;
     const OnDevice put = put_on_device(s.engine, s.values, s.options.nonfinite, batches);
-    check_room(s.batches(), batches.size());
+    check_room(s, batches.size(), sum_of_squares(batches));
     const Joined joined(s.last);
     wait(add_batches(s, put.batches, {}));
 }
@@ -291,7 +312,7 @@ cl_event Moments::add(std::span<const Batch> batches, std::span<const cl_event> 
     auto& s = *state_;
     if (batches.empty()) throw InvalidArgument("batches", "at least one", "none");
     check_batches(s.values, s.options.nonfinite, batches);
-    check_room(s.batches(), batches.size());
+    check_room(s, batches.size(), sum_of_squares(batches));
     return add_batches(s, batches, wait_list).give();
 }
 
@@ -301,7 +322,9 @@ cl_event Moments::merge(const Moments& other, std::span<const cl_event> wait_lis
     if (a.values != b.values) throw InvalidArgument("merge", std::to_string(a.values) + " values", std::to_string(b.values));
     if (&a.engine.state() != &b.engine.state()) throw InvalidArgument("merge", "a state on the same Engine", "another's");
     if (a.options != b.options) throw InvalidArgument("merge", "a state with the same options", "others");
-    check_room(a.batches(), b.batches());
+    double squares = 0;
+    for (const auto& g : b.groups) squares += static_cast<double>(g.weight2.hi);
+    check_room(a, b.batches(), squares);
     for (std::size_t g = 0; g < a.groups.size(); ++g) {
         if (b.groups[g].batches == 0 && g > 0) continue;
         const auto entry = describe({}, {}, a.groups[g], b.groups[g]);
@@ -320,7 +343,7 @@ void Moments::merge(const Moments& other) { wait(Event(merge(other, {}))); }
 
 void Moments::clear() {
     auto& s = *state_;
-    wait(s.last);
+    s.last = forget(std::move(s.last));
     s.add_rows.write(std::vector<std::byte>(s.add_rows.size()));
     s.groups.assign(s.groups.size(), {});
 }

@@ -59,8 +59,20 @@ struct Reading {
 /// Weights, sizes and the nonfinite policy of batches that come as views.
 void check_batches(std::uint64_t values, NonFinite nonfinite, std::span<const Batch> batches);
 
+/// Throws InvalidArgument for a state of no values, or of more than sizes can tell.
+void check_values(std::uint64_t values);
+
 /// Throws InvalidArgument where a state would hold more batches than it can count.
 void check_room(std::uint64_t batches, std::uint64_t more);
+/// The same, and where the sum of squares of all weights would be no float.
+void check_room(const Moments::State& state, std::uint64_t more, double squares);
+
+/// Of the weights of batches.
+template <class Batches> double sum_of_squares(const Batches& batches) {
+    double sum = 0;
+    for (const auto& b : batches) sum += b.weight * b.weight;
+    return sum;
+}
 
 /// Host batches as views, with the buffers under them. Checks what Moments::add promises to check.
 struct OnDevice {

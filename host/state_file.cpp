@@ -66,10 +66,19 @@ void check_whole(const StateFile& state) {
     if (!state.shape.alpha.empty() && state.shape.alpha.size() != pixels_of(state.shape))
         throw InvalidArgument("alpha", std::to_string(pixels_of(state.shape)) + " values",
                               std::to_string(state.shape.alpha.size()));
-    for (const auto& plane : state.sums.planes)
+    for (const auto& plane : state.sums.planes) {
         if (plane.words.size() != values)
             throw InvalidArgument("plane " + plane.name, std::to_string(values) + " values",
                                   std::to_string(plane.words.size()));
+        for (const auto& name : channels_of(plane.name, state.shape))
+            if (name.size() > longest_name)
+                throw InvalidArgument(
+                    "channels", "names that leave room for " + plane.name + " in " + std::to_string(longest_name) + " bytes",
+                    name.substr(0, 32) + "..");
+    }
+    for (const auto* settings : {&state.settings, &state.sums.settings})
+        for (const auto& [name, value] : *settings)
+            if (name.find('=') != std::string::npos) throw InvalidArgument("settings", "names without =", name);
     check_ranges(state);
 }
 

@@ -54,7 +54,7 @@ double excess(const json& result, const Known& k) {
         const double error = m.at("standard_error");
         return std::fabs(m.at("mean").get<double>() - want) / (2 * rounding + 5 * error);
     };
-    return std::max(one("bias_times_n", k.bias, digit), one("rmse_times_root_n", k.rmse, .005));
+    return std::max(one("bias_times_weight", k.bias, digit), one("rmse_times_root_weight", k.rmse, .005));
 }
 
 }  // namespace
@@ -80,10 +80,10 @@ TEST(EstimatorsTool, unbiased_estimators_stay_so_with_unequal_weights) {
     const auto all = simulate({"--models", "A", "B", "--samples", "500000", "--most", "16", "--unequal"});
     for (const auto& model : all)
         for (const char* name : {"mean", "mickey, 8 groups", "crossfit-regression, 8"}) {
-            const auto bias = cell(model, name, 16).at("bias_times_n");
+            const auto bias = cell(model, name, 16).at("bias_times_weight");
             EXPECT_NEAR(bias.at("mean"), 0, 5 * bias.at("standard_error").get<double>()) << name;
         }
-    const auto bias = cell(all.at(0), "ratio", 16).at("bias_times_n");
+    const auto bias = cell(all.at(0), "ratio", 16).at("bias_times_weight");
     EXPECT_LT(bias.at("mean").get<double>() + 5 * bias.at("standard_error").get<double>(), 0)
         << "planted fault: a biased one passes";
 }

@@ -451,6 +451,28 @@ TEST(Image, a_failed_write_that_was_swallowed_is_thrown_at_close) {
     EXPECT_EQ(scratch.files(), 0u);
 }
 
+TEST(Image, channels_that_the_file_would_change_are_refused) {
+    const clratio::test::Scratch scratch;
+    const auto channels = [&](const Image& image) -> std::string {
+        try {
+            write_image(scratch / "a.exr", image);
+        } catch (const InvalidArgument& e) {
+            return e.name;
+        }
+        return "";
+    };
+    Image image = small_image();
+    image.channels.front() = std::string(255, 'x');
+    EXPECT_EQ(channels(image), "");
+    EXPECT_EQ(read_image(scratch / "a.exr").channels.size(), image.channels.size());
+    image.channels.front() += 'x';
+    EXPECT_EQ(channels(image), "channels");
+    image.channels.front() = "A";
+    image.alpha.assign(static_cast<std::size_t>(image.width()) * static_cast<std::size_t>(image.height()), 1.0f);
+    EXPECT_EQ(channels(image), "channels");
+    EXPECT_THROW(set_image_threads(1u << 31), InvalidArgument);
+}
+
 TEST(Image, other_shapes_are_refused_with_both_names) {
     Image a = small_image();
     a.path = "a.exr";

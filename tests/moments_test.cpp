@@ -7,6 +7,7 @@
 #include <limits>
 #include <type_traits>
 
+#include "clratio/fixed.hpp"
 #include "launch.hpp"
 #include "support/refused.hpp"
 #include "support/samples.hpp"
@@ -218,6 +219,44 @@ TEST(Moments, misuse_is_refused_by_name) {
     Moments strict(engine, values, {.nonfinite = NonFinite::fail});
     refused([&] { strict.add(std::span(&nowhere, 1), {}); }, "NonFinite::fail");
     EXPECT_EQ(s.batches(), 0u);
+}
+
+TEST(Moments, sizes_and_weights_that_sums_cannot_hold_are_refused) {
+    const Engine engine;
+    for (const std::uint64_t count : {std::uint64_t{0}, std::uint64_t{1} << 61, ~std::uint64_t{0}}) {
+        refused([&] { Moments(engine, count); }, "values: expected 1 to 2^50");
+        refused([&] { FixedMoments(engine, count); }, "values: expected 1 to 2^50");
+    }
+    Moments s(engine, 1);
+    const std::vector<float> one{1}, two{1, 2};
+    refused([&] { s.add(one, one, 2 * most_weight); }, "weight: expected a sample count from 2^-60 to 2^60");
+    for (int k = 0; k < 255; ++k) s.add(one, one, most_weight);
+    refused([&] { s.add(one, one, most_weight); }, "weight: expected weights whose squares sum to less than 2^128");
+    refused([&] { s.merge(s); }, "weight: expected weights whose squares sum to less than 2^128");
+    EXPECT_EQ(s.batches(), 255u);
+    EXPECT_EQ(Moments(engine, s.snapshot()).weight(), 255 * most_weight);
+    refused([&] { s.add(std::vector<HostBatch>{{one, one}, {one, two}}); }, "t of batch 1: expected 1 values, got 2");
+}
+
+// A command before it fails; what was to follow is refused, not waited for, and clear() begins anew.
+TEST(Moments, a_failed_command_is_told_and_cleared) {
+    const Engine engine;
+    const std::vector<float> one{1, 2}, t{4, 4};
+    const Buffer mb = Buffer::copy_of(engine, std::as_bytes(std::span(one))),
+                 tb = Buffer::copy_of(engine, std::as_bytes(std::span(t)));
+    const Batch batch{{mb.mem(), 0, 2}, {tb.mem(), 0, 2}};
+    Moments s(engine, 2);
+    FixedMoments fixed(engine, 2);
+    const cl_event gate = clCreateUserEvent(engine.context(), nullptr);
+    const Event added(s.add(std::span(&batch, 1), {&gate, 1})), other(fixed.add(std::span(&batch, 1), {&gate, 1}));
+    clSetUserEventStatus(gate, -5);
+    for (const Event& e : {added, other}) EXPECT_THROW(wait(e), DeviceError);
+    EXPECT_THROW(s.add(one, t), DeviceError);
+    EXPECT_THROW(fixed.add(one, t), DeviceError);
+    s.clear();
+    fixed.clear();
+    EXPECT_EQ(s.batches() + fixed.batches(), 0u);
+    clReleaseEvent(gate);
 }
 
 TEST(Moments, stands_on_the_callers_buffers) {

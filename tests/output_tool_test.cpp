@@ -107,4 +107,8 @@ TEST(OutputTool, render_refuses_a_folder_with_batches_of_another_render) {
     EXPECT_EQ(clratio_tool(render + Words{"--batches", "3", "--seed", "5"}).code, 0) << "its own files it replaces";
     expect_refused(render + Words{"--batches", "2"}, 1, "_002.exr: is of another render");
     expect_refused(render, 1, "is of another render");
+    const Words other{"render", "window", "--size", "8x6", "-o", scratch / "r", "--batches", "3"};
+    expect_refused(other, 1, "cannot be written", {.file_size_limit = 100});
+    for (const auto& entry : std::filesystem::directory_iterator(scratch / "r"))
+        EXPECT_EQ(entry.path().filename().string().find("_00"), std::string::npos) << "batches of two renders";
 }

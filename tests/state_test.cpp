@@ -69,6 +69,27 @@ TEST(State, ranges_that_overlap_or_are_empty_are_refused) {
     EXPECT_EQ(BatchRanges::parse("").count(), 0u);
     EXPECT_EQ(r.overlap(BatchRanges::parse("[0,2) [5,8) [9,11)")), std::nullopt);
     EXPECT_EQ(r.overlap(BatchRanges::parse("[0,2) [4,7)")), (BatchRanges::Range{4, 5}));
+    EXPECT_EQ(r.first_beyond(BatchRanges::parse("[0,20)")), std::nullopt);
+    EXPECT_EQ(r.first_beyond(BatchRanges::parse("[0,4) [8,9)")), 4u);
+    EXPECT_EQ(r.first_beyond(BatchRanges::parse("[2,6)")), 8u);
+    EXPECT_EQ(r.first_beyond(BatchRanges()), 2u);
+    refused([&] { r.count(0, 0); }, "groups: expected at least 1");
+}
+
+// OpenEXR cuts names at 255 bytes, and those of a state begin with its planes'.
+TEST(State, names_that_would_be_cut_or_read_back_as_others_are_refused) {
+    const Scratch scratch;
+    const Engine engine;
+    StateFile state = state_of(engine, 0, 1);
+    state.shape.channels.front() = std::string(245, 'x');
+    write_state(scratch / "a.exr", state);
+    EXPECT_EQ(read_state(scratch / "a.exr").shape.channels, state.shape.channels);
+    state.shape.channels.front() += 'x';
+    refused([&] { write_state(scratch / "b.exr", state); }, "channels: expected names that leave room for weight.hi");
+    state.shape.channels.front() = "x";
+    state.settings.emplace_back("a=b", "c");
+    refused([&] { write_state(scratch / "b.exr", state); }, "settings: expected names without =");
+    EXPECT_EQ(scratch.files(), 1u);
 }
 
 // ---- there and back

@@ -151,7 +151,27 @@ TEST(View, misuse_is_refused_by_name) {
     refused([&] { combine(engine, wraps, half, half, {half, {}, nullptr}); }, "m: expected a view inside its buffer");
     refused([&] { combine(engine, endless, endless, endless, {endless, {}, nullptr}); }, "inside its buffer");
     refused([&] { combine(engine, all, all, all, {all, {}, mem.mem()}); }, "flags: expected a view apart from estimate");
+    const cl_buffer_region first{0, 50 * sizeof(float)}, later{0, 80 * sizeof(float)};
+    const auto part = [&](const cl_buffer_region& region) {
+        return Memory(clCreateSubBuffer(mem.mem(), CL_MEM_READ_WRITE, CL_BUFFER_CREATE_TYPE_REGION, &region, nullptr));
+    };
+    const Memory a = part(first), b = part(later);
+    const View in_a{a.get(), 0, 50}, in_b{b.get(), 0, 50}, shifted_in_b{b.get(), 1, 50};
+    refused(
+        [&] {
+            combine(engine, in_a, in_a, in_a, {shifted_in_b, {}, nullptr});
+        },
+        "estimate: expected a view apart from m");
+    refused(
+        [&] {
+            combine(engine, half, half, half, {shifted_in_b, {}, nullptr});
+        },
+        "estimate: expected a view apart from m");
+    clReleaseEvent(combine(engine, in_a, in_a, in_a, {in_b, {}, nullptr}));
     const std::vector<float> three(3), two(2);
+    Tau four_of_one(std::vector<float>{1});
+    four_of_one.channels = 3;
+    refused([&] { combine(engine, three, three, four_of_one); }, "tau: expected 3 numbers, one for each channel, got 1");
     refused([&] { combine(engine, three, two, 1.0f); }, "t: expected 3 values, got 2");
     refused(
         [&] {

@@ -20,7 +20,7 @@ enum class NonFinite {
     fail,       ///< the whole batch is refused with InvalidArgument, the state stays as it was (blocking calls only)
 };
 
-/// The range of a batch's weight: squares of weights and sums of them stay floats.
+/// The range of a batch's weight: its square is a float, as the sum of a state's squares must be, which is below 2^128.
 inline constexpr double least_weight = 0x1p-60, most_weight = 0x1p60;
 
 /// What a batch's weight says. Only error bars differ, and the corrections of estimators that use them.
@@ -70,7 +70,7 @@ struct StatePlanes {
 ///
 /// Shapes: every batch has size() values. Units: those of m and t.
 /// NaN and infinity: by NonFinite. Zero t: accepted. Negative values: accepted, counted by negatives().
-/// Weights: from 2^-60 to 2^60, else InvalidArgument; the sum is exact for integers below 2^48.
+/// Weights: from 2^-60 to 2^60, the sum of their squares below 2^128, else InvalidArgument; the sum is exact for integers below 2^48.
 /// Determinism: the same batches in the same order give the same bits at every width and work size, and however many are
 /// added in one call, on every device with correctly rounded + - * / and fma; another grouping, merged, agrees within 2 ulp
 /// of the estimate.

@@ -28,6 +28,7 @@ public:
     std::uint64_t count() const;
     std::uint64_t count(std::uint64_t group, std::uint64_t groups) const;  ///< of the indices k with k mod groups = group
     std::optional<Range> overlap(const BatchRanges& other) const;          ///< the first stretch that both hold
+    std::optional<std::uint64_t> first_beyond(const BatchRanges& other) const;  ///< the first index that the other lacks
     const std::vector<Range>& ranges() const { return ranges_; }
     bool empty() const { return ranges_.empty(); }
 

@@ -25,7 +25,8 @@ enum class Domain : std::uint32_t {
     study = CLR_DOMAIN_STUDY,
 };
 
-/// A stream of 2^60 words. Seeds are of 64 bits with philox, of 32 with pcg4d3x.
+/// A stream of 2^62 words, of which each kind of draw has the first 2^60 of its own. Seeds are of 64 bits with philox, of 32
+/// with pcg4d3x.
 struct Stream {
     std::uint64_t seed = 0;
     std::uint32_t id = 0;

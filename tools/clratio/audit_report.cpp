@@ -113,7 +113,7 @@ must be further from it than that. The seeds were fixed beforehand. The models o
 
 - A: t lognormal, .8 in the log; m = V t, visible (V = 1) with probability .2 + .7 t / (1 + t). Correlation .77. A0: the same with .6.
 - B: m and t lognormal, .6 in the log, independent.
-- C: t Pareto of exponent 2.2; m = V t, V = 1 with probability .8 / (1 + .3 (t - 1)). Correlation .15.
+- C: t Pareto of exponent 2.2; m = V t, V = 1 with probability .8 / (1 + .3 (t - 1)). Correlation .13.
 
 s is the relative deviation of the denominator, st / |tau + i|; sd the deviation of the residual m - (mu / tau) t; n the samples in an
 estimate; KS the largest distance of two distribution functions.

@@ -30,7 +30,10 @@ kernel void draw_pairs(global float* m, global float* t, uint model, ulong seed,
         clr_real seen = clr_fma((clr_real)(0.7f), t_one / (one + t_one), (clr_real)(0.2f));
         if (model == 1) seen = (clr_real)(0.6f);
         if (model == 3) {
-            t_one = clr_exp(clr_log(clr_uniform(w.w0)) * (clr_real)(-1.0f / 2.2f));
+            // Two words for u: a lattice of one would cut the tail, and a fifth of E[t^2] with it.
+            const clr_real below = clr_fma(clr_to_real(w.w2), (clr_real)(0x1p-32f), (clr_real)(0x1p-33f));
+            const clr_real u = (clr_to_real(w.w0) + below) * (clr_real)(0x1p-32f);
+            t_one = clr_exp(clr_log(u) * (clr_real)(-1.0f / 2.2f));
             seen = (clr_real)(0.8f) / clr_fma((clr_real)(0.3f), t_one - one, one);
         }
         const clr_real visible = clr_uniform(w.w1) < seen ? t_one : zero;

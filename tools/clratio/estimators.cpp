@@ -29,6 +29,7 @@ struct Measured {
 /// One estimator after N batches, relative to mu: N bias, sqrt(N) RMSE, share outside [0, tau].
 struct Cell {
     std::uint64_t batches = 0;
+    double weight = 0;  ///< of all of them
     Measured bias, rmse;
     double outside = 0;
 };
@@ -107,6 +108,7 @@ struct Tally {
         const double bias = first / count, square = second / count, root = std::sqrt(square);
         const double of_square = std::sqrt(std::max(0.0, fourth / count - square * square) / count);
         return {batches,
+                weight,
                 {bias * weight, weight * std::sqrt(std::max(0.0, square - bias * bias) / count)},
                 {root * std::sqrt(weight), std::sqrt(weight) * of_square / (2 * root)},
                 outside / count};
@@ -253,9 +255,11 @@ void print_markdown(const Result& result, const Options& options) {
     const auto at = columns(options.most);
     fmt::print("\n## Model {}: {}\n\nE[m] = {:.6f}, tau = {:.6f}\n", result.model.name, result.model.text, result.model.mu,
                result.model.tau);
-    fmt::print("\nN · bias / E[m] ± standard error, after N {}\n\n", options.unequal ? "units of weight" : "batches");
+    const char* const weight = options.unequal ? "W" : "N";
+    fmt::print("\n{} · bias / E[m] ± standard error, after N batches{}\n\n", weight,
+               options.unequal ? " of weight W in all" : "");
     print_rows(result, at, [](const Cell& c) { return fmt::format("{:+.3f} ± {:.3f}", c.bias.mean, c.bias.error); });
-    fmt::print("\n√N · RMSE / E[m] ± standard error\n\n");
+    fmt::print("\n√{} · RMSE / E[m] ± standard error\n\n", weight);
     print_rows(result, at, [](const Cell& c) { return fmt::format("{:.3f} ± {:.3f}", c.rmse.mean, c.rmse.error); });
     fmt::print("\nShare of estimates outside [0, tau]\n\n");
     print_rows(result, at, [](const Cell& c) { return fmt::format("{:.4f}", c.outside); });
@@ -276,8 +280,9 @@ Json json_of(const Result& result) {
         Json cells = Json::array();
         for (const Cell& c : row.cells)
             cells.push_back({{"n", c.batches},
-                             {"bias_times_n", json_of(c.bias)},
-                             {"rmse_times_root_n", json_of(c.rmse)},
+                             {"weight", c.weight},
+                             {"bias_times_weight", json_of(c.bias)},
+                             {"rmse_times_root_weight", json_of(c.rmse)},
                              {"outside", c.outside}});
         out["estimators"][row.name] = cells;
     }

@@ -17,11 +17,9 @@ struct Options {
 void require_nothing_lost(const std::string& output, const clratio::BatchRanges& merged) {
     if (!std::filesystem::exists(output)) return;
     const clratio::BatchRanges there = clratio::inspect_state(output).ranges;
-    for (const auto& range : there.ranges())
-        for (std::uint64_t k = range.begin; k < range.end; ++k)
-            if (!merged.contains(k))
-                throw clratio::IoError(
-                    output, "", "would lose batch " + std::to_string(k) + ", which it holds and the merged states do not");
+    if (const auto lost = there.first_beyond(merged))
+        throw clratio::IoError(
+            output, "", "would lose batch " + std::to_string(*lost) + ", which it holds and the merged states do not");
 }
 
 int merge(const Options& options) {

@@ -57,8 +57,9 @@ bool is_of_a_render(const std::string& name) {
            ((name.starts_with("m_") || name.starts_with("t_")) && name.ends_with(".exr"));
 }
 
-/// What an earlier render has left would be combined with what this one writes.
-void require_no_other_batches(const Options& o) {
+/// What an earlier render has left would be combined with what this one writes: other names are refused, and of its own
+/// names none is left before the first is written.
+void make_room(const Options& o) {
     std::set<std::string> written;
     for (std::uint32_t batch = 0; batch < o.batches; ++batch)
         for (const char letter : {'m', 't'}) written.insert(name_of_batch(letter, batch, o.batches));
@@ -69,6 +70,8 @@ void require_no_other_batches(const Options& o) {
                                    "is of another render, and would be combined with this one; remove it, or choose "
                                    "another folder");
     }
+    std::error_code none;
+    for (const std::string& name : written) std::filesystem::remove(std::filesystem::path(o.folder) / name, none);
 }
 
 class Writer {
@@ -179,7 +182,7 @@ void print_report(const Options& o, const Plan& plan, const Report& r) {
 int render(const Options& options) {
     const Plan plan = with_usage_errors([&] { return plan_of(options); });
     make_folder(options.folder);
-    require_no_other_batches(options);
+    make_room(options);
     print_report(options, plan, render_all(options, plan));
     return ok;
 }
@@ -194,7 +197,7 @@ Writes into DIR
   tau.exr          the exact mean of t: what a perfect t.exr would be
   reference.exr    the exact mean of m: what you wish m.exr were
 m and t are one batch of weight --spp. With --batches B there are m_000.exr, t_000.exr, .. of seeds S, S + 1, ..
-A folder that holds batches of another render is refused.
+Batches of the same names are removed first; a folder with more of them is refused.
 
 Estimators (where along a camera ray the fog is sampled)
   uni        evenly                          ds     by the fog on the ray, within the box (truncated)

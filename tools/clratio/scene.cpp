@@ -176,6 +176,7 @@ std::vector<std::string> scene_names() {
 }
 
 NamedScene gray(NamedScene scene) {
+    if (ends_with(scene.name, "-gray")) return scene;
     scene.name += "-gray";
     scene.title += ", gray";
     scene.scene = clratio::gray(scene.scene);

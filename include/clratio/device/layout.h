@@ -91,8 +91,7 @@ CLR_FN void clr_store_view(clr_real v, global float* p, clr_layout view, ulong f
 #define CLR_PAST_ALIGNMENT 0
 #endif
 
-// Whether whole vectors of a view that no kernel argument reads go past the caches, which would read each line before it
-// is written: large ones do.
+// Whether whole vectors of a result go past the caches, which would read each line before it is written: large ones do.
 CLR_FN bool clr_goes_past(global const float* p, clr_layout view, ulong count) {
     const ulong mask = CLR_PAST_ALIGNMENT - 1;
     return CLR_PAST_ALIGNMENT != 0 && count >= 1ul << 20 && view.stride == view.channels &&
