@@ -138,6 +138,30 @@ std::vector<float> occluder_table(const Scene& scene, const Light& light) {
     return table;
 }
 
+/// The same picture around the origin where the medium lies far from it beside its size: floats would not tell its points
+/// apart.
+Scene near_origin(Scene scene) {
+    Box& medium = scene.medium.box;
+    Vector3 middle{};
+    double size = 0, distance = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+        middle[k] = (medium.lo[k] + medium.hi[k]) / 2;
+        size = std::max(size, medium.hi[k] - medium.lo[k]);
+        distance = std::max(distance, std::abs(middle[k]));
+    }
+    if (distance <= 4 * size) return scene;
+    const auto move = [&](Vector3& point) {
+        for (std::size_t k = 0; k < 3; ++k) point[k] -= middle[k];
+    };
+    for (Vector3* point : {&medium.lo, &medium.hi, &scene.camera.eye, &scene.camera.at}) move(*point);
+    for (Sphere& s : scene.spheres) move(s.centre);
+    for (Box& b : scene.boxes) {
+        move(b.lo);
+        move(b.hi);
+    }
+    return scene;
+}
+
 /// mu / tau in planes of the device's channels, with room for a whole vector at the end.
 std::vector<float> share_planes(const Scene& scene, Frame frame, const device::clr_medium& d) {
     const ExactImage image = exact_image(scene, frame);
@@ -154,8 +178,9 @@ std::vector<float> share_planes(const Scene& scene, Frame frame, const device::c
 
 MediumScene::State::State(const Engine& e, const Scene& s, Frame f) : engine(e), scene(s), frame(f) {
     const Light light(s.medium.light);
-    device = describe(s, f, light);
-    occluders = occluder_table(s, light);
+    const Scene near = near_origin(s);
+    device = describe(near, f, light);
+    occluders = occluder_table(near, light);
     shares = share_planes(s, f, device);
     occluder_buffer = Buffer::copy_of(e, std::as_bytes(std::span(occluders)));
     share_buffer = Buffer::copy_of(e, std::as_bytes(std::span(shares)));

@@ -146,6 +146,29 @@ TEST(MediumDevice, tau_is_within_the_stated_error) {
         EXPECT_TRUE(tau_is_exact(tau_image(MediumScene(engine(), scene)), exact_image(scene, {})));
 }
 
+TEST(MediumDevice, a_scene_may_lie_far_from_the_origin) {
+    const Frame frame{40, 30};
+    for (const Scene& scene : scenes()) {
+        Scene far = scene;
+        const auto move = [](Vector3& p) { p = {p[0] + 1e4, p[1] - 1e5, p[2] + 1e6}; };
+        for (Vector3* p : {&far.medium.box.lo, &far.medium.box.hi, &far.camera.eye, &far.camera.at}) move(*p);
+        for (Sphere& s : far.spheres) move(s.centre);
+        for (Box& b : far.boxes) {
+            move(b.lo);
+            move(b.hi);
+        }
+        const MediumScene on_device(engine(), far, frame);
+        EXPECT_TRUE(tau_is_exact(tau_image(on_device), exact_image(scene, frame)));
+        const auto m = render(on_device, {}, {1}, 16), near = render(MediumScene(engine(), scene, frame), {}, {1}, 16);
+        double apart = 0, sum = 0;
+        for (std::size_t i = 0; i < near.m.size(); ++i) {
+            apart += std::abs(static_cast<double>(m.m[i]) - near.m[i]);
+            sum += near.m[i];
+        }
+        EXPECT_LT(apart, 1e-3 * sum) << "the same samples, save where one lies on a shadow's edge";
+    }
+}
+
 TEST(MediumDevice, the_error_of_tau_catches_planted_faults) {
     const Frame frame{100, 75};
     const MediumScene scene(engine(), scenes()[2], frame);

@@ -44,9 +44,9 @@ struct Camera {
     double fov_y = 40;  ///< degrees, from the lower edge of the image to the upper
 };
 
-/// Ranges, checked by check_scene() and by all that take a scene: all finite; lo < hi in each axis; radius > 0; 1e-9 <=
-/// sigma_t <= 1e9; sigma_s and irradiance >= 0, one product of them > 0; |g| < 1; light not 0; 0 < fov_y < 180; the view not
-/// along y; at most most_occluders of each kind.
+/// Ranges, checked by check_scene() and by all that take a scene: all finite, coordinates and radius below 1e9; lo < hi in
+/// each axis; radius > 0; 1e-9 <= sigma_t <= 1e9; sigma_s and irradiance >= 0, one product of them > 0; |g| < 1; light not
+/// 0; 0 < fov_y < 180; the view not along y; at most most_occluders of each kind.
 struct Scene {
     Medium medium;
     Camera camera;
@@ -190,6 +190,7 @@ inline constexpr std::uint32_t most_levels = CLR_MOST_LEVELS;
 /// stream: any seed and id < 2^31; its domain is `scene` whatever stream.domain says. Draws: docs/streams.md.
 /// Where all rays miss, 0. Where nothing is in the way, m and t have the same bits. NaN and infinity do not occur.
 /// Accuracy: tau within 4e-6 absolute for tau of order 1, 1e-7 relative typically; short chords lose digits.
+/// So do views along the beam where |g| is near 1: up to 2^-23 / (1 - |g|)^2 relative. Where the scene lies does not matter.
 /// Errors: InvalidArgument for rows, samples (1 to 2^24), levels (1 to most_levels), a stream or a view out of range.
 /// Determinism: the same bits at every width, work size and split into rows, and on the host (render_pixel).
 /// Event forms: enqueued after wait_list, nothing waits; the caller releases the event.
