@@ -111,7 +111,8 @@ constexpr auto page_numbers_end =
     R"html(<p class="note">Two standard errors in the tooltip: from the spread of the images, whose channels and pixels are
 summed first, for this grid of pixels; and with pixels as clusters, for any other grid, too. Values with heavy tails
 (independent t, WVDS mean in a dense medium) have no stable RMSE: the median size of an error is given in
-errors.csv.</p></details>
+errors.csv. An error counts as at most 64 to 128 ranges; where that makes a plain mean's number too small by four standard
+errors, the exact one stands behind it in brackets.</p></details>
 )html";
 
 constexpr auto page_tables = R"html(<h2 id="tables">Densities of the error</h2>

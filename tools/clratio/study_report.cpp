@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <limits>
 #include <thread>
 
 #include "audit.hpp"
@@ -188,6 +189,12 @@ void Page::convergence() {
     add(page_numbers_end);
 }
 
+/// The exact number, in brackets, where the largest errors, which are counted as smaller ones, are missed in the other.
+std::string what_is_missed(const SceneResult& scene, const Estimator& e, std::uint32_t level, const Estimate& rmse) {
+    const double exact = e.ratio ? std::numeric_limits<double>::quiet_NaN() : predicted_rmse(scene, e, level, all_channels);
+    return rmse.value < exact - 4 * rmse.error ? fmt::format(" ({:.4g})", 1e3 * exact) : "";
+}
+
 void Page::number_table(const SceneResult& scene) {
     add(fmt::format("<h3>{}</h3><div class=\"scroll\"><table class=\"numbers\"><tr><th>", escaped(scene.named.title)));
     for (std::uint32_t level = 0; level < levels; ++level) add(fmt::format("<th>N = {}", 1u << level));
@@ -199,6 +206,7 @@ void Page::number_table(const SceneResult& scene) {
             add(std::isnan(s.rmse.error) ? fmt::format("<td>{:.4g}", 1e3 * s.rmse.value)
                                          : fmt::format("<td title=\"± {:.2g}, ± {:.2g} by pixels\">{:.4g}",
                                                        1e3 * s.rmse.error, 1e3 * s.rmse_pixel_error, 1e3 * s.rmse.value));
+            add(what_is_missed(scene, e, level, s.rmse));
         }
         const double predicted = predicted_rmse(scene, e, levels - 1, all_channels);
         add(std::isnan(predicted) ? std::string("<td>–") : fmt::format("<td>{:.4g}", 1e3 * predicted));
