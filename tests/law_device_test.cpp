@@ -7,6 +7,7 @@
 #include "clratio/law.hpp"
 #include "launch.hpp"
 #include "support/oclgrind.hpp"
+#include "support/samples.hpp"
 #include "support/theory.hpp"
 
 using namespace clratio;
@@ -160,6 +161,35 @@ TEST(LawDevice, is_the_vectors) {
     }
     EXPECT_LE(density.error, 5e-7) << std::hex << density.bits;
     EXPECT_LE(published.error, 5e-7) << std::hex << published.bits;
+    EXPECT_LE(probability.error, 2e-7) << std::hex << probability.bits;
+    EXPECT_LE(log_density.error, 1e-6) << std::hex << log_density.bits;
+}
+
+// Where s or |a| / b is large, their rounding to float is what counts.
+TEST(LawDevice, wide_denominators_and_narrow_residuals_lose_what_is_stated) {
+    const Engine engine;
+    test::Samples draw(1);
+    Worst density, probability, log_density;
+    for (int k = 0; k < 500; ++k) {
+        const double s = std::pow(10, 6 * draw.uniform() - 3), a = std::pow(10, 6 * draw.uniform() - 2);
+        const ErrorModel model{(k % 2 ? a : -a) / s, 1, 1, s};
+        const ErrorLaw law(Law::exact, model);
+        const double beyond = std::max({1., s / 6, a / 6}), peak = law.pdf(law.modes().front());
+        std::vector<float> x;
+        for (const double size : {0., 1e-6, 1e-3, .03, .1, .3, .6, 1., 1.5, 2., 3., 5., 30., 1e3, 1e6})
+            for (const double sign : {-1., 1.}) x.push_back(static_cast<float>(sign * size * law.scale()));
+        std::vector<float> pdf(x.size()), log_pdf(x.size()), cdf(x.size());
+        law_pdf(engine, Law::exact, {&model, 1}, x, pdf);
+        law_log_pdf(engine, Law::exact, {&model, 1}, x, log_pdf);
+        law_cdf(engine, Law::exact, {&model, 1}, x, cdf);
+        for (std::size_t i = 0; i < x.size(); ++i) {
+            const double want = law.log_pdf(x[i]);
+            density.add(std::abs(pdf[i] - law.pdf(x[i])) / peak / beyond, x[i]);
+            probability.add(std::abs(cdf[i] - law.cdf(x[i])) / beyond, x[i]);
+            log_density.add(std::abs(log_pdf[i] - want) / (1 + std::abs(want)) / beyond, x[i]);
+        }
+    }
+    EXPECT_LE(density.error, 5e-7) << std::hex << density.bits;
     EXPECT_LE(probability.error, 2e-7) << std::hex << probability.bits;
     EXPECT_LE(log_density.error, 1e-6) << std::hex << log_density.bits;
 }

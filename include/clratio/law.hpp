@@ -97,7 +97,8 @@ private:
 /// of many models (a model for each pixel) is points = 1. What is not divisible is refused.
 /// Units, edge cases, NaN: as ErrorLaw. The published law has a density only: InvalidArgument for its cdf and sf where
 /// sigma_t > 0. The integrals are for the host: InvalidArgument.
-/// Accuracy: density 5e-7 of the peak, cdf and sf 2e-7, log density 1e-6 (1 + |log f|), for |x| below 10^18 scale().
+/// Accuracy: density 5e-7 of the peak, cdf and sf 2e-7, log density 1e-6 (1 + |log f|), for |x| below 10^18 scale(), where
+/// s <= 6 and |a| <= 6 b (canonical()); beyond, those times s / 6 or |a| / (6 b), whichever is more.
 /// Cost: 8 bytes a value moved, 20 bytes a model.
 /// Determinism: the same bits as the host twin of device/law.h, at every width and work size.
 /// Errors: InvalidArgument before anything is enqueued.
