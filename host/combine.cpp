@@ -88,8 +88,7 @@ Combined sized(std::uint64_t count, const CombineOptions& options, Combined reus
 class HostReading {
 public:
     HostReading(const Engine& engine, Combined& result, const Tau& tau, std::uint64_t begin, std::uint64_t count)
-        : engine_(engine), begin_(begin), count_(count), result_(result),
-          rows_(Buffer::zeroed(engine, most_work_items(engine) * CLR_TALLY_FLAGS * sizeof(std::uint64_t))) {
+        : engine_(engine), begin_(begin), count_(count), result_(result), rows_(zeroed_rows<CLR_TALLY_FLAGS>(engine)) {
         const auto view = [&](std::vector<float>& values) { return View{place(values), 0, count}; };
         const bool over_tau = tau.image.data() == result.estimate.data();
         out_.estimate = {place(result.estimate, over_tau ? Buffer::over_host : Buffer::onto_host), 0, count};
@@ -196,10 +195,6 @@ std::vector<std::pair<const char*, View>> views_of(std::span<const Batch> batche
     std::vector<std::pair<const char*, View>> all;
     for (const Batch& b : batches) all.insert(all.end(), {{"m", b.m}, {"t", b.t}});
     return all;
-}
-
-Buffer rows_for_adding(const Engine& engine) {
-    return Buffer::zeroed(engine, most_work_items(engine) * CLR_TALLY_ADD * sizeof(std::uint64_t));
 }
 
 /// Whether the pass that adds can read out as well.
@@ -422,7 +417,7 @@ cl_event combine_batches(const Engine& engine, std::span<const Batch> batches, V
     check_batches(count, state.nonfinite, batches);
     const Reading reading{tau, out, options};
     reading.check(count, views_of(batches));
-    return read_batches(engine, batches, state, reading, rows_for_adding(engine), wait_list).give();
+    return read_batches(engine, batches, state, reading, zeroed_rows<CLR_TALLY_ADD>(engine), wait_list).give();
 }
 
 Combined combine_batches(const Engine& engine, std::span<const HostBatch> batches, const Tau& tau, CombineOptions options,
@@ -442,7 +437,7 @@ Combined combine_batches(const Engine& engine, std::span<const HostBatch> batche
         const std::uint64_t size = std::min(most, count - begin);
         const OnDevice in = put_on_device(engine, size, state.nonfinite, slices(batches, begin, size));
         HostReading out(engine, result, tau, begin, size);
-        const Buffer rows = rows_for_adding(engine);
+        const Buffer rows = zeroed_rows<CLR_TALLY_ADD>(engine);
         wait(read_batches(engine, in.batches, state, out.reading(options), rows, {}));
         out.publish();
         result.negatives += sums_of_rows<CLR_TALLY_ADD>(rows)[CLR_TALLY_NEGATIVE];

@@ -64,7 +64,7 @@ DeviceInfo describe(cl_platform_id platform, cl_device_id device) {
     d.fma = (fp & CL_FP_FMA) != 0;
     d.host_memory = number<cl_bool>(device, CL_DEVICE_HOST_UNIFIED_MEMORY) == CL_TRUE;
     const auto native = number<cl_uint>(device, CL_DEVICE_NATIVE_VECTOR_WIDTH_FLOAT);
-    d.preferred_width = native >= 16 ? 16 : native >= 8 ? 8 : native >= 4 ? 4 : 1;
+    d.native_width = native >= 16 ? 16 : native >= 8 ? 8 : native >= 4 ? 4 : 1;
     return d;
 }
 
@@ -137,7 +137,7 @@ void choose_shape(Engine::State& s) {
     if (o.width != 0 && o.width != 1 && o.width != 2 && o.width != 4 && o.width != 8 && o.width != 16)
         throw InvalidArgument("width", "1, 2, 4, 8 or 16 lanes", std::to_string(o.width));
     s.grouped = o.path == EngineOptions::Path::groups || (o.path == EngineOptions::Path::automatic && !cpu);
-    s.width = o.width ? o.width : s.grouped ? 1 : s.info.preferred_width;
+    s.width = o.width ? o.width : s.grouped ? 1 : s.info.native_width;
     s.wide = o.width == 0 && !s.grouped && s.width >= 8 && is_pocl(s.info) ? 2 * s.width : s.width;
     const auto most = number<std::size_t>(s.device, CL_DEVICE_MAX_WORK_GROUP_SIZE);
     if (s.grouped && o.work_items > most)

@@ -102,23 +102,13 @@ template <class Batches> void check_weights(const State& s, const Batches& batch
     }
 }
 
-Counts sum_of(const Buffer& rows) {
-    std::vector<std::uint64_t> words(rows.size() / sizeof(std::uint64_t));
-    rows.read(std::as_writable_bytes(std::span(words)));
-    Counts sum{};
-    for (std::size_t i = 0; i < words.size(); ++i) sum[i % sum.size()] += words[i];
-    return sum;
-}
-
-Buffer make_rows(const Engine& engine) { return Buffer::zeroed(engine, most_work_items(engine) * sizeof(Counts)); }
-
 void refuse_what_does_not_fit(const State& s, std::span<const Batch> batches) {
     for (std::size_t k = 0; k < batches.size(); ++k) {
-        const Buffer rows = make_rows(s.engine);
+        const Buffer rows = zeroed_rows<CLR_FIXED_TALLY>(s.engine);
         Launch launch(s.engine, "fixed", "clr_scan_fixed");
         launch.view(batches[k].m).view(batches[k].t).arg(power(s.options.range)).arg(rows);
         wait(launch.run_ranges(s.values));
-        const Counts found = sum_of(rows);
+        const Counts found = sums_of_rows<CLR_FIXED_TALLY>(rows);
         const std::string which = "batch " + std::to_string(k);
         if (const auto bad = found[CLR_FIXED_TALLY_SKIPPED] - found[CLR_FIXED_TALLY_OUTSIDE])
             throw InvalidArgument(which, "finite values", std::to_string(bad) + " NaN or infinite ones");
@@ -161,7 +151,7 @@ Event add_all(State& s, std::vector<Batch> batches, std::span<const cl_event> wa
 
 std::uint64_t tally(const State& s, std::size_t which) {
     wait(s.last);
-    return sum_of(s.rows)[which];
+    return sums_of_rows<CLR_FIXED_TALLY>(s.rows)[which];
 }
 
 // ---- snapshots
@@ -264,7 +254,7 @@ FixedMoments::FixedMoments(const Engine& engine, std::uint64_t values, FixedOpti
     check_options(options);
     check_values(values);
     state_ = std::make_shared<State>(engine, values, options);
-    state_->rows = make_rows(engine);
+    state_->rows = zeroed_rows<CLR_FIXED_TALLY>(engine);
     for (const Shape& shape : shapes_of(options)) {
         state_->memory.emplace_back(engine, bytes_of(shape, values));
         state_->planes.*shape.plane = state_->memory.back().mem();

@@ -11,7 +11,8 @@ namespace clratio {
 
 inline constexpr std::size_t huge_page = std::size_t{2} << 20;
 
-/// v.resize(count). Whoever touches fresh memory first waits for each of its pages: a large vector asks for huge ones.
+/// v.resize(count), its values lost where it grows. Whoever touches fresh memory first waits for each of its pages: a large
+/// vector asks for huge ones.
 template <class T> void resize_large(std::vector<T>& v, std::size_t count) {
 #ifdef MADV_HUGEPAGE
     if (count > v.capacity() && count * sizeof(T) >= 2 * huge_page) {

@@ -76,6 +76,11 @@ private:
     const Event& last_;
 };
 
+/// A row of `columns` counters for each work-item, all 0.
+template <std::size_t columns> Buffer zeroed_rows(const Engine& engine) {
+    return Buffer::zeroed(engine, most_work_items(engine) * columns * sizeof(std::uint64_t));
+}
+
 /// The sums of counters that each work-item keeps a row of.
 template <std::size_t columns> std::array<std::uint64_t, columns> sums_of_rows(const Buffer& rows) {
     std::vector<std::uint64_t> all(rows.size() / sizeof(std::uint64_t));

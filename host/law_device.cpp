@@ -7,12 +7,6 @@
 namespace clratio {
 namespace {
 
-struct Task {
-    device::clr_layout x, out;
-    std::uint64_t points;
-    std::uint32_t shared_x, unused;
-};
-
 enum class Quantity { pdf, log_pdf, cdf, sf };
 
 bool probability(Quantity q) { return q == Quantity::cdf || q == Quantity::sf; }
@@ -54,7 +48,7 @@ Event fill(const Engine& engine, Law law, Quantity q, std::span<const ErrorModel
     if (x.mem == out.mem && x.count != out.count)
         throw InvalidArgument("out", "another buffer where all models share x", "the same buffer");
     const Buffer buffer = Buffer::copy_of(engine, std::as_bytes(std::span(terms)));
-    const Task task{layout(x), layout(out), points, x.count == points, 0};
+    const device::clr_law_task task{layout(x), layout(out), points, x.count == points, 0};
     return Launch(engine, "law", kernel_name(law, q))
         .arg(buffer)
         .arg(x.mem)

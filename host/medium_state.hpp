@@ -19,4 +19,11 @@ struct MediumScene::State {
     std::vector<std::uint32_t> row_hits;  ///< for each row, how many rays hit the medium
 };
 
+// What rendering and counting errors share. Errors: InvalidArgument for what is out of range.
+void check_sampler(const Sampler& sampler);
+void check_levels(std::uint32_t levels);
+device::clr_stream scene_stream(Stream stream);
+device::clr_sampler device_sampler(const Sampler& sampler, std::uint32_t samples);
+std::string options_of(const Sampler& sampler, Generator generator);  ///< of the program
+
 }  // namespace clratio

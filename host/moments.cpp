@@ -49,7 +49,7 @@ void check_weight(double weight) {
 }
 
 std::uint64_t count_nonfinite(const Engine& engine, const View& m, const View& t) {
-    const Buffer rows = Buffer::zeroed(engine, most_work_items(engine) * sizeof(std::uint64_t));
+    const Buffer rows = zeroed_rows<1>(engine);
     wait(Launch(engine, "moments", "clr_scan").view(m).view(t).arg(rows).run_ranges(m.count));
     return sums_of_rows<1>(rows)[0];
 }
@@ -89,7 +89,7 @@ std::shared_ptr<Moments::State> make_state(const Engine& engine, std::uint64_t v
     if (options.groups < 1 || options.groups > CLR_MOST_GROUPS)
         throw InvalidArgument("groups", "1 to " + std::to_string(CLR_MOST_GROUPS), std::to_string(options.groups));
     auto s = std::make_shared<Moments::State>(engine, values, options);
-    s->add_rows = Buffer::zeroed(engine, most_work_items(engine) * CLR_TALLY_ADD * sizeof(std::uint64_t));
+    s->add_rows = zeroed_rows<CLR_TALLY_ADD>(engine);
     return s;
 }
 

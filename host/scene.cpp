@@ -106,7 +106,8 @@ void check_scene(const Scene& scene) {
         const std::string name = "spheres[" + std::to_string(i) + "]";
         const Sphere& s = scene.spheres[i];
         finite(name + ".centre", s.centre);
-        if (!(s.radius > 0 && s.radius < 1e9)) refuse(name + ".radius", "a number above 0 and below 1e9", std::to_string(s.radius));
+        if (!(s.radius > 0 && s.radius < 1e9))
+            refuse(name + ".radius", "a number above 0 and below 1e9", std::to_string(s.radius));
     }
     for (std::size_t i = 0; i < scene.boxes.size(); ++i) check_box("boxes[" + std::to_string(i) + "]", scene.boxes[i]);
 }

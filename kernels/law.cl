@@ -2,13 +2,6 @@
 #include "clratio/device/law.h"
 #include "clratio/device/layout.h"
 
-typedef struct {
-    clr_layout x, out;
-    clr_u64 points;
-    clr_u32 shared_x;  // 1: every model has the same x
-    clr_u32 unused;
-} clr_law_task;
-
 CLR_FN clr_law_lanes clr_same_model(clr_law m) {
     clr_law_lanes r;
     r.s = (clr_real)(m.s);

@@ -99,18 +99,6 @@ kernel void clr_medium_render(global float* m, clr_layout m_layout, global float
 
 // Errors counted and summed, no image stored. A task is one row of the image of one seed; its sums are its own, and the
 // counters are those of its work-group: CLR_GROUPED = 0 has one work-item to a group and no atomics.
-#define CLR_ATOM_SLOT (CLR_OUTER_SLOTS + 0u)
-#define CLR_ZERO_SLOT (CLR_OUTER_SLOTS + 1u)
-#define CLR_UNUSED_SLOT (CLR_OUTER_SLOTS + 2u)  // of lanes without a value
-#define CLR_ERROR_SLOTS (CLR_OUTER_SLOTS + 3u)
-#define CLR_LEVEL_VALUES 6u  // plain and ratio, three channels each
-
-typedef struct {
-    clr_bins bins;
-    float inverse_unit;
-    uint levels;
-} clr_tally;
-
 CLR_FN void clr_count_slot(global uint* counter) {
 #if CLR_GROUPED
     atomic_inc(counter);

@@ -300,9 +300,4 @@ TEST(BatchesSmall, every_path) {
     EXPECT_EQ(bits(more), bits(combine(sum, in.control(), options)));
 }
 
-TEST(Batches, kernels_are_clean_under_oclgrind) {
-    const auto report = under_oclgrind("batches_test", "BatchesSmall.*");
-    if (!report) GTEST_SKIP() << "oclgrind is not installed (Debian: apt install oclgrind)";
-    EXPECT_EQ(report->status, 0) << report->output;
-    EXPECT_EQ(report->complaints(), 0) << report->output;
-}
+TEST(Batches, kernels_are_clean_under_oclgrind) { expect_clean_under_oclgrind("batches_test", "BatchesSmall.*"); }

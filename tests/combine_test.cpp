@@ -413,12 +413,7 @@ TEST(CombineSmall, DISABLED_a_store_out_of_bounds) {
              .run_ranges(8));
 }
 
-TEST(Combine, kernels_are_clean_under_oclgrind) {
-    const auto report = under_oclgrind("combine_test", "CombineSmall.*");
-    if (!report) GTEST_SKIP() << "oclgrind is not installed (Debian: apt install oclgrind)";
-    EXPECT_EQ(report->status, 0) << report->output;
-    EXPECT_EQ(report->complaints(), 0) << report->output;
-}
+TEST(Combine, kernels_are_clean_under_oclgrind) { expect_clean_under_oclgrind("combine_test", "CombineSmall.*"); }
 
 TEST(Combine, oclgrind_sees_a_store_out_of_bounds) {
     const auto report =

@@ -499,9 +499,4 @@ TEST(EstimatorSmall, every_estimator) {
     }
 }
 
-TEST(Estimator, kernels_are_clean_under_oclgrind) {
-    const auto report = under_oclgrind("estimator_test", "EstimatorSmall.*");
-    if (!report) GTEST_SKIP() << "oclgrind is not installed (Debian: apt install oclgrind)";
-    EXPECT_EQ(report->status, 0) << report->output;
-    EXPECT_EQ(report->complaints(), 0) << report->output;
-}
+TEST(Estimator, kernels_are_clean_under_oclgrind) { expect_clean_under_oclgrind("estimator_test", "EstimatorSmall.*"); }

@@ -558,9 +558,4 @@ TEST(FixedSmall, every_kernel) {
     run_every_kernel({.width = 1, .path = Path::groups, .work_items = 4, .disk_cache = false});
 }
 
-TEST(Fixed, kernels_are_clean_under_oclgrind) {
-    const auto report = under_oclgrind("fixed_test", "FixedSmall.*");
-    if (!report) GTEST_SKIP() << "oclgrind is not installed (Debian: apt install oclgrind)";
-    EXPECT_EQ(report->status, 0) << report->output;
-    EXPECT_EQ(report->complaints(), 0) << report->output;
-}
+TEST(Fixed, kernels_are_clean_under_oclgrind) { expect_clean_under_oclgrind("fixed_test", "FixedSmall.*"); }

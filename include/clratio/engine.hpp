@@ -25,7 +25,7 @@ struct DeviceInfo {
     bool fp64 = false;
     bool correctly_rounded_divide = false, fma = false;  ///< as the device reports them
     bool host_memory = false;                            ///< device and host share memory
-    int preferred_width = 1;                             ///< float lanes
+    int native_width = 1;                                ///< float lanes
 };
 
 /// All devices of all platforms, in the order of the OpenCL loader. Empty where there is no platform.

@@ -27,7 +27,7 @@ Json describe(const clratio::DeviceInfo& d) {
             {"compute_units", d.compute_units},
             {"global_memory", d.global_memory},
             {"largest_allocation", d.largest_allocation},
-            {"float_lanes", d.preferred_width},
+            {"float_lanes", d.native_width},
             {"fp64", d.fp64},
             {"correctly_rounded_divide", d.correctly_rounded_divide},
             {"fma", d.fma},
@@ -40,7 +40,7 @@ void print_device(const clratio::DeviceInfo& d, bool picked) {
     fmt::print("{} {}  {}\n", picked ? "*" : " ", d.id, d.name);
     fmt::print("       {}, {}, driver {}\n", type_of(d), d.platform, d.driver);
     fmt::print("       {} compute units, {} float lanes, memory {:.1f} GiB, largest allocation {:.1f} GiB{}\n",
-               d.compute_units, d.preferred_width, static_cast<double>(d.global_memory) / gib,
+               d.compute_units, d.native_width, static_cast<double>(d.global_memory) / gib,
                static_cast<double>(d.largest_allocation) / gib, d.host_memory ? ", shared with the host" : "");
     fmt::print("       doubles: {}; correctly rounded division: {}; fma: {}\n", yes_no(d.fp64),
                yes_no(d.correctly_rounded_divide), yes_no(d.fma));

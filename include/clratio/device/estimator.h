@@ -108,7 +108,7 @@ CLR_FN clr_real clr_root(clr_real x) {
     return clr_sqrt(x > zero ? x : clr_abs(x) * zero);
 }
 
-CLR_FN clr_real clr_slope(clr_quotient q) { return q.empty ? (clr_real)(1.0f) : clr_abs(q.control * q.inverse); }
+CLR_FN clr_real clr_delta_factor(clr_quotient q) { return q.empty ? (clr_real)(1.0f) : clr_abs(q.control * q.inverse); }
 
 // ---- estimators of one record
 
@@ -288,7 +288,7 @@ CLR_FN clr_uint clr_trials(clr_joint j, clr_real tau, clr_question ask) {
 }
 
 CLR_FN clr_real clr_delta_error(clr_quotient q, clr_spread s, clr_evidence n) {
-    return clr_slope(q) * clr_root(s.ratio.mm * n.scale);
+    return clr_delta_factor(q) * clr_root(s.ratio.mm * n.scale);
 }
 
 // The standard error of finite data; the delta method's unless the estimator has one of its own.

@@ -4,6 +4,7 @@
 #define CLRATIO_DEVICE_LAW_H
 
 #include "clratio/device/exponential.h"
+#include "clratio/device/layout.h"
 
 CLR_NAMESPACE_BEGIN
 
@@ -12,6 +13,14 @@ CLR_NAMESPACE_BEGIN
 typedef struct {
     float s, a, b, inverse_sd, half_turn;
 } clr_law;
+
+// What a launch works out: `points` values for each model.
+typedef struct {
+    clr_layout x, out;
+    clr_u64 points;
+    clr_u32 shared_x;  // 1: every model has the same x
+    clr_u32 unused;
+} clr_law_task;
 
 CLR_CONSTANT float clr_gauss_node[6] = {0.0337652429f, 0.169395307f, 0.380690407f, 0.619309593f, 0.830604693f, 0.966234757f};
 CLR_CONSTANT float clr_gauss_weight[6] = {0.0856622462f, 0.180380787f, 0.233956967f,

@@ -10,6 +10,19 @@
 
 CLR_NAMESPACE_BEGIN
 
+// A row of counters of errors: the bins and what lies outside, then these.
+#define CLR_ATOM_SLOT (CLR_OUTER_SLOTS + 0u)
+#define CLR_ZERO_SLOT (CLR_OUTER_SLOTS + 1u)
+#define CLR_UNUSED_SLOT (CLR_OUTER_SLOTS + 2u)  // of lanes without a value
+#define CLR_ERROR_SLOTS (CLR_OUTER_SLOTS + 3u)
+#define CLR_LEVEL_VALUES 6u  // plain and ratio, three channels each
+
+typedef struct {
+    clr_bins bins;
+    float inverse_unit;
+    clr_u32 levels;
+} clr_tally;
+
 // Sums of samples, in radiance.
 typedef struct {
     clr_real m[3], t[3];
