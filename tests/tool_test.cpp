@@ -493,6 +493,8 @@ TEST(Tool, picture_draws_srgb_side_by_side) {
 TEST(Tool, numbers_are_read_strictly_and_names_need_not_be_text) {
     const Words law{"law", "--mu", ".5", "--tau", "1", "--sigma-m", "1", "--sigma-t", ".35", "--x", "0"};
     expect_refused(law + Words{"--n", "-1"}, 2, "--n: expected a whole number from 0 on, got -1");
+    expect_refused(law + Words{"--n", "1.5"}, 2, "--n");
+    EXPECT_EQ(answer(law + Words{"--n", "1e3"}), answer(law + Words{"--n", "1000"}));
     expect_refused(law + Words{"--rho", ""}, 2, "--rho: expected a number");
     expect_refused({"picture", "a.exr", "-o", "b.png", "--exposure", "nan"}, 2, "--exposure: expected a number");
     const Scratch scratch;

@@ -73,9 +73,10 @@ struct StatePlanes {
 /// Weights: from 2^-60 to 2^60, the sum of their squares below 2^128, else InvalidArgument; the sum is exact for integers
 /// below 2^48. Determinism: the same batches in the same order give the same bits at every width and work size, and however
 /// many are added in one call, on every device with correctly rounded + - * / and fma; another grouping, merged, agrees
-/// within 2 ulp of the estimate. Cost: state_bytes() on the device (40 bytes a value, 52 with skip; times groups); 8 batches
-/// a launch, or the batches of one group, which reads and writes the state of the group once. Not for concurrent use of one
-/// object; several objects may share an Engine across threads.
+/// within 2 ulp of the estimate. What is NaN is so everywhere, with whatever bits. After a failed command the sums are void:
+/// calls throw its DeviceError until clear(). Cost: state_bytes() on the device (40 bytes a value, 52 with skip; times
+/// groups); 8 batches a launch, or the batches of one group, which reads and writes the state of the group once. Not for
+/// concurrent use of one object; several objects may share an Engine across threads.
 class Moments {
 public:
     Moments(const Engine& engine, std::uint64_t values, MomentsOptions options = {});

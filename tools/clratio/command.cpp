@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 
 #include <charconv>
+#include <cmath>
 #include <limits>
 #include <optional>
 #include <type_traits>
@@ -29,6 +30,12 @@ template <class T> std::string refuse_misread(const std::string& text) {
     return std::is_unsigned_v<T> && text.front() == '-' ? "expected a whole number from 0 on, got " + text : "";
 }
 
+/// As CLI11 reads it.
+std::string plain_whole(const std::string& text) {
+    const auto whole = whole_of(text);
+    return whole ? std::to_string(*whole) : text;
+}
+
 std::string refuse_empty(const std::string& text) { return text.empty() ? "expected a text, got nothing" : ""; }
 
 template <class T> struct Number { using type = T; };
@@ -36,6 +43,16 @@ template <class T> struct Number<std::optional<T>> { using type = T; };
 template <class T> struct Number<std::vector<T>> { using type = T; };
 
 }  // namespace
+
+std::optional<std::uint64_t> whole_of(const std::string& text) {
+    const char *const begin = text.data(), *const end = begin + text.size();
+    std::uint64_t whole = 0;
+    if (const auto [at, error] = std::from_chars(begin, end, whole); error == std::errc() && at == end) return whole;
+    double real = 0;
+    const auto [at, error] = std::from_chars(begin, end, real);
+    const bool is_whole = error == std::errc() && at == end && real >= 0 && real < 0x1p63 && real == std::floor(real);
+    return is_whole ? std::optional(static_cast<std::uint64_t>(real)) : std::nullopt;
+}
 
 Option& Option::type(const std::string& name) { return option_->type_name(name), *this; }
 Option& Option::shows_default() { return option_->capture_default_str(), *this; }
@@ -71,6 +88,7 @@ template <class T> Option Command::option(const std::string& names, T& value, co
         option->check(refuse_misread<Single>);
     else
         option->check(refuse_empty);
+    if constexpr (std::is_unsigned_v<Single>) option->transform(plain_whole);
     return Option(option);
 }
 

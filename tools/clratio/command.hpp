@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,9 @@ class Option;
 }
 
 namespace tool {
+
+/// A whole number, written as 1000000 or 1e6; nothing where it is none. Options of whole numbers take both.
+std::optional<std::uint64_t> whole_of(const std::string& text);
 
 /// One option; each call says more of it.
 class Option {

@@ -2,20 +2,12 @@
 #include "command.hpp"
 
 #include <algorithm>
-#include <charconv>
-#include <cmath>
 
 namespace tool {
 
 std::uint64_t whole_number(const std::string& option, const std::string& text) {
-    const char *const begin = text.data(), *const end = begin + text.size();
-    std::uint64_t whole = 0;
-    if (const auto [at, error] = std::from_chars(begin, end, whole); error == std::errc() && at == end) return whole;
-    double real = 0;
-    const auto [at, error] = std::from_chars(begin, end, real);
-    if (error != std::errc() || at != end || !(real >= 0 && real < 0x1p63) || real != std::floor(real))
-        throw UsageError(fmt::format("{}: expected a whole number, such as 1000000 or 1e6, got {}", option, text));
-    return static_cast<std::uint64_t>(real);
+    if (const auto whole = whole_of(text)) return *whole;
+    throw UsageError(fmt::format("{}: expected a whole number, such as 1000000 or 1e6, got {}", option, text));
 }
 
 void StreamOptions::add_to(Command& command) {

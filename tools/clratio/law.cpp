@@ -51,7 +51,7 @@ Json describe(const Options& options, const ErrorLaw& law) {
              {"tail_constant", number(law.tail_constant())},
              {"results", Json::array()}};
     for (const double v : options.x)
-        out["results"].push_back({{"x", v},
+        out["results"].push_back({{"x", number(v)},
                                   {"pdf", number(law.pdf(v))},
                                   {"log_pdf", number(law.log_pdf(v))},
                                   {"cdf", number(law.cdf(v))},
