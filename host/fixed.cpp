@@ -325,7 +325,7 @@ void FixedMoments::merge(const FixedMoments& other) { wait(Event(merge(other, {}
 
 void FixedMoments::clear() {
     State& s = *state_;
-    s.last = forget(std::move(s.last));
+    s.last = forget(s.last);
     s.rows.write(std::vector<std::byte>(s.rows.size()));
     s.batches = s.weight = 0;
 }

@@ -212,7 +212,7 @@ void require_not_failed(cl_event event) {
     if (status < 0) throw DeviceError("a command that was to be waited for", status);
 }
 
-Event forget(Event last) {
+Event forget(const Event& last) {
     if (const cl_event event = last.get()) clWaitForEvents(1, &event);
     return {};
 }

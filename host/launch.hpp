@@ -61,7 +61,7 @@ void check_apart(const char* name, const View& output, const char* other_name, c
 void check_overlap(const char* name, const View& output, const char* other_name, const View& other);
 
 /// Waits until a command is over, failed or not. Gives none, to take its place.
-Event forget(Event last);
+Event forget(const Event& last);
 
 /// Waits for the last launch of a state when its scope ends, also by an exception: launches read their caller's memory.
 class Joined {

@@ -23,7 +23,7 @@ inline std::filesystem::path output_target(const std::filesystem::path& path) {
 /// The name of `path`, for files beside it whose names add to it: one of more than 200 bytes would leave them no room, and
 /// gives way to its first 180 and a checksum of it.
 inline std::string short_name(const std::filesystem::path& path) {
-    const std::string name = path.filename().string();
+    std::string name = path.filename().string();
     if (name.size() <= 200) return name;
     Checksum checksum;
     checksum.add(std::span<const char>(name));

@@ -287,7 +287,7 @@ void verify(const fs::path& path, const StateFile& state, std::uint64_t wanted) 
     std::vector<std::uint32_t> words;
     for (int y = w.y0; y <= w.y1; y += most) {
         const int last = std::min(w.y1, y + most - 1);
-        const auto count = static_cast<std::size_t>(last - y + 1);
+        const auto count = static_cast<std::size_t>(last - y) + 1;
         words.assign(count * row_words, 0);
         Words left = words;
         const auto take = [&](std::size_t n) { return std::exchange(left, left.subspan(n)).first(n); };
