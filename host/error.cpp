@@ -31,13 +31,15 @@ double difference_of_products(double rho, double a, double b, double c, double d
     return std::fma(scaled, b, -cd) + (error + lost * b);
 }
 
-int exponent_of(double x) { return x == 0 ? std::numeric_limits<int>::min() / 2 : std::ilogb(x); }
+constexpr int no_exponent = -1'000'000;  // of 0: below that of any number, and sums of it are no overflow
+
+int exponent_of(double x) { return x == 0 ? no_exponent : std::ilogb(x); }
 
 // r sigma_m - mu sigma_t / c, on numbers near 1, so that no product overflows or vanishes.
 double slope_term(double r, double sigma_m, double mu, double sigma_t, double c) {
     const int c_scale = exponent_of(c), t_scale = exponent_of(sigma_t) - c_scale;
     const int scale = std::max(exponent_of(sigma_m), exponent_of(mu) + t_scale);
-    if (scale < -2000) return 0;
+    if (scale <= no_exponent / 2) return 0;
     const int left = exponent_of(sigma_m) - scale, right = exponent_of(mu) + t_scale - scale;  // one of them is 0
     const auto near_1 = [](double x) { return x == 0 ? 0 : std::scalbn(x, -std::ilogb(x)); };
     const double unit_c = std::scalbn(c, -c_scale);

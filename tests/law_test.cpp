@@ -72,6 +72,7 @@ TEST(Error, a_keeps_its_digits_where_its_terms_cancel_and_where_products_leave_t
         {{1e-300, 1e-300, 0, 5e-324}, -5e-324}};
     for (const auto& [model, a] : cases) EXPECT_LE(relative(canonical(model).a, a), 1e-15) << text(model);
     EXPECT_EQ(canonical({0, 0, 0, 0}).a, 0);
+    EXPECT_EQ(canonical({0, 1e300, 0, 0}).a, 0);
 }
 
 TEST(Error, bad_parameters_are_refused_by_name) {
