@@ -1,5 +1,6 @@
 #include "clratio/error.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <utility>
