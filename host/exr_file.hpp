@@ -18,6 +18,11 @@ struct Image::Metadata {
 inline Window window_of(const Imath::Box2i& box) { return {box.min.x, box.min.y, box.max.x, box.max.y}; }
 inline Imath::Box2i box_of(const Window& w) { return {{w.x0, w.y0}, {w.x1, w.y1}}; }
 
+inline std::string text_of(const Window& w) {
+    return "(" + std::to_string(w.x0) + "," + std::to_string(w.y0) + ")-(" + std::to_string(w.x1) + "," +
+           std::to_string(w.y1) + ")";
+}
+
 /// Slices for channels interleaved at `values`, 4 bytes (float or uint) each; a channel's name is its name in the file.
 inline void add_slices(Imf::FrameBuffer& frame, const std::vector<std::string>& channels, Imf::PixelType type,
                        const void* values, const Imath::Box2i& window) {

@@ -9,6 +9,7 @@
 #include "clratio/device/fixed.h"
 #include "clratio/snapshot.hpp"
 #include "moments_state.hpp"
+#include "settings.hpp"
 
 namespace clratio {
 
@@ -156,18 +157,10 @@ std::uint64_t tally(const State& s, std::size_t which) {
 
 // ---- snapshots
 
-using Settings = std::vector<std::pair<std::string, std::string>>;
-
 Settings settings_of(FixedOptions o) {
     return {{"nonfinite", o.nonfinite == NonFinite::skip ? "skip" : "fail"},
             {"resolution", std::to_string(o.resolution)},
             {"range", std::to_string(o.range)}};
-}
-
-std::string text(const Settings& settings) {
-    std::string all;
-    for (const auto& [name, value] : settings) all += (all.empty() ? "" : " ") + name + "=" + value;
-    return all;
 }
 
 int number(const std::string& text) {
@@ -230,7 +223,8 @@ FixedOptions fixed_options(const Snapshot& snapshot) {
         if (name == "range") o.range = number(value);
     }
     if (settings_of(o) != snapshot.settings)
-        throw InvalidArgument("snapshot", "settings of a fixed state, as " + text(settings_of({})), text(snapshot.settings));
+        throw InvalidArgument("snapshot", "settings of a fixed state, as " + text_of(settings_of({})),
+                              text_of(snapshot.settings));
     return o;
 }
 
@@ -310,7 +304,7 @@ cl_event FixedMoments::merge(const FixedMoments& other, std::span<const cl_event
     if (a.values != b.values) throw InvalidArgument("merge", std::to_string(a.values) + " values", std::to_string(b.values));
     if (&a.engine.state() != &b.engine.state()) throw InvalidArgument("merge", "a state on the same Engine", "another's");
     if (settings_of(a.options) != settings_of(b.options))
-        throw InvalidArgument("merge", text(settings_of(a.options)), text(settings_of(b.options)));
+        throw InvalidArgument("merge", text_of(settings_of(a.options)), text_of(settings_of(b.options)));
     check_room(a, b.batches, b.weight);
     Launch launch(a.engine, "fixed", "clr_merge_fixed");
     b.give_planes(a.give_planes(launch)).arg(a.rows).arg(b.rows).arg(a.rows.size() / sizeof(std::uint64_t));

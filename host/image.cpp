@@ -2,20 +2,17 @@
 
 #include <ImfThreading.h>
 
+#include "exr_file.hpp"
+
 namespace clratio {
 namespace {
-
-std::string text(const Window& w) {
-    return "(" + std::to_string(w.x0) + "," + std::to_string(w.y0) + ")-(" + std::to_string(w.x1) + "," +
-           std::to_string(w.y1) + ")";
-}
 
 std::string shape_of(const Image& image) {
     std::string channels;
     for (const auto& c : image.channels) channels += (channels.empty() ? "" : ",") + c;
     return (image.path.empty() ? "an image made here" : image.path) + " with " + std::to_string(image.width()) + "x" +
-           std::to_string(image.height()) + " pixels, channels " + channels + ", data window " + text(image.data_window) +
-           ", display window " + text(image.display_window);
+           std::to_string(image.height()) + " pixels, channels " + channels + ", data window " + text_of(image.data_window) +
+           ", display window " + text_of(image.display_window);
 }
 
 Image in_the_shape_of(const Image& like, std::vector<float>&& values) {

@@ -7,6 +7,7 @@
 #include "draws.hpp"
 #include "medium_state.hpp"
 #include "scene.hpp"
+#include "vector3.hpp"
 
 namespace clratio {
 namespace {
@@ -22,11 +23,6 @@ void split(float (&to)[2][3], std::size_t k, double x) {
     to[0][k] = static_cast<float>(x);
     to[1][k] = static_cast<float>(x - static_cast<double>(to[0][k]));
 }
-
-Vector3 cross(const Vector3& a, const Vector3& b) {
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-double dot(const Vector3& a, const Vector3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 /// The light as kernels see it, in double: everything that depends on its direction alone.
 struct Light {

@@ -5,6 +5,8 @@
 #include <numbers>
 #include <string>
 
+#include "vector3.hpp"
+
 namespace clratio {
 namespace {
 
@@ -44,13 +46,6 @@ void check_medium(const Medium& m) {
     finite("medium.light", m.light);
     if (!(std::hypot(m.light[0], m.light[1], m.light[2]) > 1e-9)) refuse("medium.light", "a direction", text(m.light));
 }
-
-Vector3 cross(const Vector3& a, const Vector3& b) {
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-
-Vector3 difference(const Vector3& a, const Vector3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-Vector3 times(const Vector3& v, double s) { return {v[0] * s, v[1] * s, v[2] * s}; }
 
 void check_camera(const Camera& c) {
     finite("camera.eye", c.eye);
@@ -126,8 +121,6 @@ Scene gray(Scene scene) {
     sigma.fill((sigma[0] + sigma[1] + sigma[2]) / 3);
     return scene;
 }
-
-Vector3 unit(const Vector3& v) { return times(v, 1 / std::hypot(v[0], v[1], v[2])); }
 
 CameraAxes axes_of(const Camera& camera, Frame frame) {
     const Vector3 forward = unit(difference(camera.at, camera.eye));

@@ -5,8 +5,6 @@
 
 namespace clratio {
 
-Vector3 unit(const Vector3& v);
-
 /// The camera's axes: forward of length 1, right and up as long as half the image at distance 1.
 struct CameraAxes {
     Vector3 forward, right, up;

@@ -7,14 +7,13 @@
 #include <numeric>
 
 #include "scene.hpp"
+#include "vector3.hpp"
 
 namespace clratio {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-double dot(const Vector3& a, const Vector3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vector3 minus(const Vector3& a, const Vector3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 Vector3 along(const Vector3& o, double s, const Vector3& w) { return {o[0] + s * w[0], o[1] + s * w[1], o[2] + s * w[2]}; }
 
 // (1 - e^-z) / z for z >= 0.
@@ -49,7 +48,7 @@ Chord in_box(const Ray& ray, const Box& box) {
 
 // The discriminant is R^2 - |q - (q w) w|^2: the other form cancels.
 Chord in_ball(const Ray& ray, const Sphere& sphere) {
-    const Vector3 q = minus(ray.origin, sphere.centre);
+    const Vector3 q = difference(ray.origin, sphere.centre);
     const double b = dot(q, ray.direction);
     const Vector3 off = along(q, -b, ray.direction);
     const double d = sphere.radius * sphere.radius - dot(off, off);
@@ -59,7 +58,7 @@ Chord in_ball(const Ray& ray, const Sphere& sphere) {
 
 // The shadow of a convex body is convex: one interval on each line. A sphere's is half a cylinder and the ball.
 Chord shadow_of(const Ray& ray, const Vector3& omega, const Sphere& sphere) {
-    const Vector3 q = minus(ray.origin, sphere.centre);
+    const Vector3 q = difference(ray.origin, sphere.centre);
     const double h = dot(q, omega), rate = dot(ray.direction, omega);
     const Vector3 off = along(q, -h, omega), turn = along(ray.direction, -rate, omega);
     const double a = dot(turn, turn), b = dot(off, turn), e = dot(off, off) - sphere.radius * sphere.radius;

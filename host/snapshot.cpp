@@ -7,11 +7,10 @@
 
 #include "clratio/fixed.hpp"
 #include "moments_state.hpp"
+#include "settings.hpp"
 
 namespace clratio {
 namespace {
-
-using Settings = std::vector<std::pair<std::string, std::string>>;
 
 const std::map<std::string, NonFinite> nonfinites{
     {"skip", NonFinite::skip}, {"propagate", NonFinite::propagate}, {"fail", NonFinite::fail}};
@@ -165,12 +164,7 @@ void check_alike(const char* call, const Snapshot& a, const Snapshot& b) {
     if (a.kind != b.kind) throw InvalidArgument(call, "a state of kind " + a.kind, b.kind);
     if (a.groups.size() != b.groups.size())
         throw InvalidArgument(call, std::to_string(a.groups.size()) + " groups", std::to_string(b.groups.size()));
-    const auto text = [](const Settings& settings) {
-        std::string all;
-        for (const auto& [name, value] : settings) all += (all.empty() ? "" : " ") + name + "=" + value;
-        return all;
-    };
-    if (a.settings != b.settings) throw InvalidArgument(call, "settings " + text(a.settings), text(b.settings));
+    if (a.settings != b.settings) throw InvalidArgument(call, "settings " + text_of(a.settings), text_of(b.settings));
 }
 
 }  // namespace

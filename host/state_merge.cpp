@@ -1,29 +1,20 @@
 #include <algorithm>
 
 #include "clratio/state.hpp"
+#include "exr_file.hpp"
+#include "settings.hpp"
 
 namespace clratio {
 namespace {
 
-using Settings = std::vector<std::pair<std::string, std::string>>;
+using clratio::text_of;
 
 std::string text_of(const std::string& text) { return text; }
-
-std::string text_of(const Settings& settings) {
-    std::string all;
-    for (const auto& [name, value] : settings) all += (all.empty() ? "" : " ") + name + "=" + value;
-    return all.empty() ? "none" : all;
-}
 
 std::string text_of(const std::vector<std::string>& names) {
     std::string all;
     for (const auto& name : names) all += (all.empty() ? "" : ",") + name;
     return all;
-}
-
-std::string text_of(const Window& w) {
-    return "(" + std::to_string(w.x0) + "," + std::to_string(w.y0) + ")-(" + std::to_string(w.x1) + "," +
-           std::to_string(w.y1) + ")";
 }
 
 template <class T> std::string differs(const char* what, const T& a, const T& b) {
