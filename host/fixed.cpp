@@ -319,7 +319,8 @@ void FixedMoments::merge(const FixedMoments& other) { wait(Event(merge(other, {}
 
 void FixedMoments::clear() {
     State& s = *state_;
-    s.last = forget(s.last);
+    wait_quietly(s.last);
+    s.last = {};
     s.rows.write(std::vector<std::byte>(s.rows.size()));
     s.batches = s.weight = 0;
 }

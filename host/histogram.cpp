@@ -8,6 +8,7 @@
 #include <type_traits>
 
 #include "draws.hpp"
+#include "edges.hpp"
 
 namespace clratio {
 namespace {
@@ -226,10 +227,10 @@ float least_in(const device::clr_bins& bins, std::uint32_t i) {
 
 std::vector<double> Histogram::edges() const {
     const auto count = static_cast<std::uint32_t>(bins.size());
-    std::vector<double> nominal, counted;
-    for (std::uint32_t i = 0; i < count; ++i) nominal.push_back(lo + (hi - lo) * i / count);
-    if (count > 0) nominal.push_back(hi);
-    if (count == 0 || precision == Precision::double_precision) return nominal;
+    if (count == 0) return {};
+    const std::vector<double> nominal = equal_edges(lo, hi, count);
+    if (precision == Precision::double_precision) return nominal;
+    std::vector<double> counted;
     const auto b = device_bins<float>({lo, hi, count});
     for (std::uint32_t i = 0; i < count; ++i) counted.push_back(least_in(b, i));
     counted.push_back(b.hi);

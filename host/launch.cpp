@@ -212,9 +212,8 @@ void require_not_failed(cl_event event) {
     if (status < 0) throw DeviceError("a command that was to be waited for", status);
 }
 
-Event forget(const Event& last) {
-    if (const cl_event event = last.get()) clWaitForEvents(1, &event);
-    return {};
+void wait_quietly(const Event& event) {
+    if (const cl_event e = event.get()) clWaitForEvents(1, &e);
 }
 
 Launch& Launch::after(std::span<const cl_event> events) {

@@ -60,17 +60,15 @@ void check_apart(const char* name, const View& output, const char* other_name, c
 /// Throws InvalidArgument where an output shares elements with another view without being the same view.
 void check_overlap(const char* name, const View& output, const char* other_name, const View& other);
 
-/// Waits until a command is over, failed or not. Gives none, to take its place.
-Event forget(const Event& last);
+/// Waits until a command is over, failed or not.
+void wait_quietly(const Event& event);
 
 /// Waits for the last launch of a state when its scope ends, also by an exception: launches read their caller's memory.
 class Joined {
 public:
     explicit Joined(const Event& last) : last_(last) {}
     Joined(const Joined&) = delete;
-    ~Joined() {
-        if (const cl_event event = last_.get()) clWaitForEvents(1, &event);
-    }
+    ~Joined() { wait_quietly(last_); }
 
 private:
     const Event& last_;

@@ -8,6 +8,7 @@
 #include <numeric>
 #include <string>
 
+#include "edges.hpp"
 #include "law_integral.hpp"
 #include "quadrature.hpp"
 
@@ -199,17 +200,6 @@ std::vector<double> ErrorLaw::bin_probabilities(std::span<const double> edges) c
     out.push_back(sf(edges.back()));
     return out;
 }
-
-namespace {
-
-std::vector<double> equal_edges(double lo, double hi, std::uint32_t count) {
-    std::vector<double> edges{lo};
-    for (std::uint32_t i = 1; i < count; ++i) edges.push_back(lo + (hi - lo) * i / count);
-    if (count > 0) edges.push_back(hi);
-    return edges;
-}
-
-}  // namespace
 
 std::vector<double> ErrorLaw::bin_probabilities(double lo, double hi, std::uint32_t count) const {
     return bin_probabilities(equal_edges(lo, hi, count));

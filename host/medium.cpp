@@ -259,9 +259,8 @@ cl_event draw(const MediumScene& scene, const Sampler& sampler, const Stream& st
     check_sampler(sampler);
     rows = checked(rows, s.frame);
     const std::uint64_t values = scene.values(rows) * std::max(1u, levels);
-    for (const auto& [name, view] : {std::pair{"m", m}, {"t", t}}) {
-        check_output(name, view, values);
-    }
+    check_output("m", m, values);
+    check_output("t", t, values);
     check_apart("m", m, "t", t);
     return Launch(s.engine, "medium", "clr_medium_render", options_of(sampler, stream.generator))
         .view(m)

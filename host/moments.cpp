@@ -343,7 +343,8 @@ void Moments::merge(const Moments& other) { wait(Event(merge(other, {}))); }
 
 void Moments::clear() {
     auto& s = *state_;
-    s.last = forget(s.last);
+    wait_quietly(s.last);
+    s.last = {};
     s.add_rows.write(std::vector<std::byte>(s.add_rows.size()));
     s.groups.assign(s.groups.size(), {});
 }

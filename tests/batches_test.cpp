@@ -193,10 +193,10 @@ TEST(Batches, event_forms_wait_for_nothing) {
                  t = Buffer::copy_of(engine, std::as_bytes(std::span(in.t[0]))), out(engine, 999 * sizeof(float));
     const Batch batch{{m.mem(), 0, 999}, {t.mem(), 0, 999}};
     const cl_event gate = clCreateUserEvent(engine.context(), nullptr);
-    std::atomic<bool> open = false;
-    std::jthread opens([&] {
-        std::this_thread::sleep_for(std::chrono::seconds(2));
-        open = true;
+    std::atomic<bool> enqueued = false, late = false;
+    std::jthread opens([&] {  // when all is enqueued, or where something waits for it
+        for (int k = 0; k < 6000 && !enqueued; ++k) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        late = !enqueued;
         clSetUserEventStatus(gate, CL_COMPLETE);
     });
     const auto enqueue = [&] {
@@ -206,9 +206,10 @@ TEST(Batches, event_forms_wait_for_nothing) {
     Moments sum(engine, 999);
     const FixedMoments fixed(engine, 999);
     const Event added(sum.add(std::span(&batch, 1), {&gate, 1}));
-    EXPECT_FALSE(open);
+    enqueued = true;
     for (const Event& e : {first, second, added}) wait(e);
     opens.join();
+    EXPECT_FALSE(late);
     clReleaseEvent(gate);
 }
 

@@ -5,6 +5,8 @@
 #include <chrono>
 #include <limits>
 
+#include "edges.hpp"
+
 namespace tool {
 
 using clratio::ErrorLaw;
@@ -48,10 +50,10 @@ void write_csv(OutputFile& out, const ErrorCounts& counts) {
     const auto published = counts.published().bin_densities(h.lo, h.hi, bins);
     const double width = counts.bin_width(), samples = static_cast<double>(h.total());
     const std::string head = fmt::format("{},{},", name_of(counts.estimator), counts.model.n);
-    const auto edge = [&](std::uint32_t i) { return i == bins ? h.hi : h.lo + (h.hi - h.lo) * i / bins; };
+    const auto edges = clratio::equal_edges(h.lo, h.hi, bins);
     out.write(fmt::format("{}-inf,{},{},,,\n", head, h.lo, h.underflow));
     for (std::uint32_t i = 0; i < bins; ++i)
-        out.write(fmt::format("{}{},{},{},{},{},{}\n", head, edge(i), edge(i + 1), h.bins[i],
+        out.write(fmt::format("{}{},{},{},{},{},{}\n", head, edges[i], edges[i + 1], h.bins[i],
                               static_cast<double>(h.bins[i]) / (samples * width), exact[i], published[i]));
     out.write(fmt::format("{}{},inf,{},,,\n", head, h.hi, h.overflow));
     out.write(fmt::format("{}nan,nan,{},,,\n", head, h.nonfinite));

@@ -70,8 +70,12 @@ void make_room(const Options& o) {
                                    "is of another render, and would be combined with this one; remove it, or choose "
                                    "another folder");
     }
-    std::error_code none;
-    for (const std::string& name : written) std::filesystem::remove(std::filesystem::path(o.folder) / name, none);
+    for (const std::string& name : written) {
+        const auto file = std::filesystem::path(o.folder) / name;
+        std::error_code failed;
+        std::filesystem::remove(file, failed);
+        if (failed) throw clratio::IoError(file.string(), "", "cannot be removed: " + failed.message());
+    }
 }
 
 class Writer {
